@@ -1,0 +1,198 @@
+//! The model description (FMI 3.0) from the variable table.
+
+use std::collections::BTreeSet;
+use std::io;
+
+use model::{Causality, EnumType, Initial, Kind, Model, Variability};
+use quick_xml::Writer;
+use quick_xml::events::{BytesDecl, BytesText, Event};
+
+use crate::c_abi::LOG_CATEGORIES;
+use crate::table::{Table, Variable, kind_name};
+use crate::unit::BaseUnit;
+
+type Xml = Writer<Vec<u8>>;
+
+/// A number as XML writes it: shortest text that gives the same bits.
+fn number(value: f64) -> String {
+    let text = format!("{value:?}");
+    text.strip_suffix(".0").map_or(text.clone(), String::from)
+}
+
+/// The model description of `M` for FMI 3.0 Co-Simulation.
+///
+/// # Errors
+/// A unit that is not known; otherwise none (writing goes to memory).
+pub fn model_description<M: Model>() -> io::Result<Vec<u8>> {
+    let table = Table::new::<M>();
+    let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
+    xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
+    xml.create_element("fmiModelDescription")
+        .with_attributes([
+            ("fmiVersion", "3.0"),
+            ("modelName", M::NAME),
+            ("instantiationToken", &table.token(M::NAME)),
+            ("description", M::DESCRIPTION),
+            ("version", env!("CARGO_PKG_VERSION")),
+            ("license", "MIT OR Apache-2.0"),
+            ("generationTool", concat!("koppel ", env!("CARGO_PKG_VERSION"))),
+            ("variableNamingConvention", "structured"),
+        ])
+        .write_inner_content(|xml| {
+            xml.create_element("CoSimulation")
+                .with_attributes([
+                    ("modelIdentifier", M::NAME),
+                    ("canGetAndSetFMUState", "true"),
+                    ("providesDirectionalDerivatives", "true"),
+                    ("canHandleVariableCommunicationStepSize", "true"),
+                ])
+                .write_empty()?;
+            units(xml, &table)?;
+            types(xml, &table)?;
+            xml.create_element("LogCategories").write_inner_content(|xml| {
+                for (name, description) in LOG_CATEGORIES {
+                    let name = name.to_string_lossy();
+                    xml.create_element("Category")
+                        .with_attributes([("name", &*name), ("description", description)])
+                        .write_empty()?;
+                }
+                Ok(())
+            })?;
+            let experiment = M::EXPERIMENT;
+            xml.create_element("DefaultExperiment")
+                .with_attributes([
+                    ("startTime", "0"),
+                    ("stopTime", &number(experiment.stop)),
+                    ("stepSize", &number(experiment.step)),
+                ])
+                .write_empty()?;
+            xml.create_element("ModelVariables").write_inner_content(|xml| {
+                table.variables.iter().enumerate().try_for_each(|(reference, v)| variable(xml, reference, v))
+            })?;
+            xml.create_element("ModelStructure").write_inner_content(|xml| structure(xml, &table))?;
+            Ok(())
+        })?;
+    xml.write_event(Event::Text(BytesText::new("\n")))?;
+    Ok(xml.into_inner())
+}
+
+fn units(xml: &mut Xml, table: &Table) -> io::Result<()> {
+    let names: BTreeSet<_> = table.variables.iter().map(|v| v.entry.unit).filter(|u| !u.is_empty()).collect();
+    xml.create_element("UnitDefinitions").write_inner_content(|xml| {
+        for name in names {
+            let unit = BaseUnit::parse(name).ok_or_else(|| io::Error::other(format!("unit {name} is not known")))?;
+            xml.create_element("Unit").with_attribute(("name", name)).write_inner_content(|xml| {
+                let attributes: Vec<_> = unit.attributes().collect();
+                let attributes = attributes.iter().map(|(name, exponent)| (*name, exponent.as_str()));
+                xml.create_element("BaseUnit").with_attributes(attributes).write_empty()?;
+                Ok(())
+            })?;
+        }
+        Ok(())
+    })?;
+    Ok(())
+}
+
+fn types(xml: &mut Xml, table: &Table) -> io::Result<()> {
+    let mut types: Vec<&'static EnumType> = Vec::new();
+    for v in &table.variables {
+        if let Kind::Enumeration(t) = v.entry.kind
+            && !types.iter().any(|known| known.name == t.name)
+        {
+            types.push(t);
+        }
+    }
+    xml.create_element("TypeDefinitions").write_inner_content(|xml| {
+        for t in types {
+            xml.create_element("EnumerationType")
+                .with_attributes([("name", t.name), ("description", t.description)])
+                .write_inner_content(|xml| {
+                    for item in t.items {
+                        xml.create_element("Item")
+                            .with_attributes([
+                                ("name", item.name),
+                                ("value", &item.value.to_string()),
+                                ("description", item.description),
+                            ])
+                            .write_empty()?;
+                    }
+                    Ok(())
+                })?;
+        }
+        Ok(())
+    })?;
+    Ok(())
+}
+
+fn variable(xml: &mut Xml, reference: usize, Variable { name, entry }: &Variable) -> io::Result<()> {
+    let reference = reference.to_string();
+    let causality = match entry.causality {
+        Causality::Parameter => "parameter",
+        Causality::Input => "input",
+        Causality::Output => "output",
+        Causality::Local => "local",
+        Causality::Inherit => "independent",
+    };
+    let variability = match entry.variability {
+        Variability::Fixed => "fixed",
+        Variability::Tunable => "tunable",
+        Variability::Discrete => "discrete",
+        Variability::Continuous => "continuous",
+    };
+    let mut attributes = vec![
+        ("name", name.clone()),
+        ("valueReference", reference),
+        ("description", entry.description.to_string()),
+        ("causality", causality.to_string()),
+        ("variability", variability.to_string()),
+    ];
+    match entry.initial {
+        Initial::Exact => attributes.push(("initial", "exact".into())),
+        Initial::Approx => attributes.push(("initial", "approx".into())),
+        Initial::Calculated => {}
+    }
+    match entry.kind {
+        Kind::Enumeration(t) => attributes.push(("declaredType", t.name.into())),
+        Kind::Float64 if !entry.unit.is_empty() => attributes.push(("unit", entry.unit.into())),
+        _ => {}
+    }
+    for (name, value) in [("min", entry.min), ("max", entry.max)] {
+        if value.is_finite() {
+            attributes.push((name, number(value)));
+        }
+    }
+    if (entry.nominal - 1.0).abs() > 0.0 {
+        attributes.push(("nominal", number(entry.nominal)));
+    }
+    if entry.has_start() {
+        let start = match entry.kind {
+            Kind::Boolean => (entry.start > 0.5).to_string(),
+            _ => number(entry.start),
+        };
+        attributes.push(("start", start));
+    }
+    let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
+    xml.create_element(kind_name(entry.kind)).with_attributes(attributes).write_empty()?;
+    Ok(())
+}
+
+/// Outputs with their exact direct dependencies; outputs computed at the start as initial unknowns.
+fn structure(xml: &mut Xml, table: &Table) -> io::Result<()> {
+    let outputs: Vec<_> = (0..table.variables.len())
+        .filter(|i| table.variables[*i].entry.causality == Causality::Output)
+        .collect();
+    for output in &outputs {
+        let inputs: Vec<_> = table.dependencies(*output).iter().map(ToString::to_string).collect();
+        xml.create_element("Output")
+            .with_attributes([("valueReference", output.to_string().as_str()), ("dependencies", &inputs.join(" "))])
+            .write_empty()?;
+    }
+    for output in outputs {
+        if table.variables[output].entry.initial != Initial::Exact {
+            xml.create_element("InitialUnknown")
+                .with_attribute(("valueReference", output.to_string().as_str()))
+                .write_empty()?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,224 @@
+//! Everything that a call can end with besides OK, and which status that is.
+
+use integrators::{SettingsError, StepError};
+use model::{EvaluationError, ParameterError};
+
+use crate::SolverMethod;
+
+/// Status of a call, numbered as `fmi3Status`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C)]
+pub enum Status {
+    /// Done
+    Ok = 0,
+    /// Done, with a message
+    Warning = 1,
+    /// Not done, nothing changed, the run may go on
+    Discard = 2,
+    /// Wrong call
+    Error = 3,
+    /// The instance is lost
+    Fatal = 4,
+}
+
+/// Why a call was not carried out.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Fault {
+    /// Function called in the wrong phase.
+    #[error("{function} may not be called in {phase}; allowed in: {allowed}")]
+    WrongPhase {
+        /// Function
+        function: &'static str,
+        /// Phase of the instance
+        phase: String,
+        /// Phases in which it may be called
+        allowed: String,
+    },
+    /// No such variable.
+    #[error("value reference {reference} does not exist (0..{count})")]
+    UnknownReference {
+        /// Value reference
+        reference: u32,
+        /// Number of variables
+        count: usize,
+    },
+    /// Variable of another type.
+    #[error("{variable} (value reference {reference}) is of type {is}, not {called}")]
+    WrongType {
+        /// Variable
+        variable: String,
+        /// Value reference
+        reference: u32,
+        /// Its type
+        is: &'static str,
+        /// Type of the call
+        called: &'static str,
+    },
+    /// Variable that cannot be set now.
+    #[error("{variable} cannot be set in {phase}: {reason}")]
+    NotSettable {
+        /// Variable
+        variable: String,
+        /// Phase
+        phase: String,
+        /// Why
+        reason: &'static str,
+    },
+    /// Null where data is needed.
+    #[error("{argument} is null")]
+    Null {
+        /// Argument
+        argument: &'static str,
+    },
+    /// Numbers of references and values differ.
+    #[error("{references} value references but {values} values")]
+    Length {
+        /// Number of references
+        references: usize,
+        /// Number of values
+        values: usize,
+    },
+    /// Function without effect in this FMU.
+    #[error("{function} is not supported: {reason}")]
+    Unsupported {
+        /// Function
+        function: &'static str,
+        /// Why
+        reason: &'static str,
+    },
+    /// An argument of a call that makes no sense.
+    #[error("{argument} = {value}; allowed: {allowed}")]
+    Argument {
+        /// Argument
+        argument: &'static str,
+        /// Value
+        value: f64,
+        /// What would be accepted
+        allowed: String,
+    },
+    /// Set with a value outside its range, or not finite.
+    #[error("{variable} = {value} is refused, the value stays {kept}; allowed: {allowed}")]
+    Value {
+        /// Variable
+        variable: String,
+        /// The value
+        value: f64,
+        /// The value that is kept
+        kept: f64,
+        /// What would be accepted
+        allowed: String,
+    },
+    /// A method that this version lacks.
+    #[error(
+        "solver.method = {name} ({method}) is not offered yet; allowed: heun (1), rk4 (2), dopri5 (3)",
+        name = method_name(*method)
+    )]
+    MethodNotOffered {
+        /// Number of the method
+        method: i64,
+    },
+    /// Solver settings.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// Parameters that do not fit together.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// The equations have no value.
+    #[error("at t = {t:.6} s: {source}")]
+    Evaluation {
+        /// Time
+        t: f64,
+        /// Cause
+        source: EvaluationError,
+    },
+    /// A result that is not a number.
+    #[error("{variable} is {value} at t = {t:.6} s")]
+    NotFinite {
+        /// Variable
+        variable: String,
+        /// Value
+        value: f64,
+        /// Time
+        t: f64,
+    },
+    /// The solver gave up.
+    #[error("step from {t:.6} s by {step:.3e} s is discarded: {cause}")]
+    Step {
+        /// Start of the step
+        t: f64,
+        /// Its size
+        step: f64,
+        /// Cause, with the name of the state
+        cause: String,
+    },
+    /// An explicit method would amplify the fastest mode.
+    #[error(
+        "step from {t:.6} s is discarded: solver.method = {method} with inner step {h:.3e} s amplifies the mode with eigenvalue {re:.4e} {im:+.4e}i 1/s by {factor:.3e} per step; largest usable solver.step: {largest:.3e} s; implicit methods for stiff cases: rodas4 (5), radau5 (6)"
+    )]
+    Unstable {
+        /// Start of the step
+        t: f64,
+        /// Method
+        method: &'static str,
+        /// Inner step
+        h: f64,
+        /// Eigenvalue, real part
+        re: f64,
+        /// Eigenvalue, imaginary part
+        im: f64,
+        /// |R(h lambda)|
+        factor: f64,
+        /// Largest usable inner step
+        largest: f64,
+    },
+    /// A panic, caught.
+    #[error("internal error, the instance is lost: {message}")]
+    Panic {
+        /// What the panic said
+        message: String,
+    },
+}
+
+fn method_name(number: i64) -> &'static str {
+    use model::{Kind, Variables};
+    let Kind::Enumeration(methods) = <SolverMethod as Variables<f64>>::TABLE[0].kind else { return "" };
+    methods.items.iter().find(|i| i.value == number).map_or("unknown", |i| i.name)
+}
+
+impl Fault {
+    /// The one place where causes become statuses.
+    #[must_use]
+    pub fn status(&self) -> Status {
+        match self {
+            Self::Value { .. }
+            | Self::Step { .. }
+            | Self::Unstable { .. }
+            | Self::Evaluation { .. }
+            | Self::NotFinite { .. } => Status::Discard,
+            Self::Panic { .. } => Status::Fatal,
+            _ => Status::Error,
+        }
+    }
+
+    /// A step that the solver gave up, with names instead of state numbers.
+    pub(crate) fn step<const N: usize>(
+        t: f64,
+        step: f64,
+        error: &StepError<EvaluationError>,
+        names: impl Fn() -> [String; N],
+    ) -> Self {
+        let name = |i: usize| names().get(i).cloned().unwrap_or_default();
+        let cause = match error {
+            StepError::NotFinite { t, index, value } => {
+                format!("{} becomes {value} at t = {t:.6} s", name(*index))
+            }
+            StepError::StepTooSmall { t, h, min, index } => format!(
+                "the step size fell to {h:.3e} s at t = {t:.6} s (below {min:.0e} s); stiffest state: {}",
+                name(*index)
+            ),
+            StepError::Rhs { t, source } => format!("at t = {t:.6} s: {source}"),
+            other => other.to_string(),
+        };
+        Self::Step { t, step, cause }
+    }
+}

@@ -1,0 +1,99 @@
+//! The archive: model description and binary in one zip, the same bytes at every build.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+use model::Model;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+use crate::describe::model_description;
+
+/// Everything that can go wrong while packing.
+#[derive(Debug, thiserror::Error)]
+pub enum PackError {
+    /// A file cannot be read or written.
+    #[error("{path}: {source}")]
+    File {
+        /// The file
+        path: String,
+        /// Cause
+        source: io::Error,
+    },
+    /// The description cannot be written.
+    #[error("model description: {0}")]
+    Description(#[from] io::Error),
+    /// The archive cannot be written.
+    #[error("archive: {0}")]
+    Archive(#[from] zip::result::ZipError),
+    /// The command line is not understood.
+    #[error("usage: {0} describe | {0} pack --library FILE --output FILE")]
+    Usage(&'static str),
+}
+
+/// Folder of the binaries of this platform inside an FMI 3.0 archive.
+const PLATFORM: &str = match (cfg!(target_os = "windows"), cfg!(target_os = "macos")) {
+    (true, _) => "x86_64-windows",
+    (_, true) => "x86_64-darwin",
+    _ => "x86_64-linux",
+};
+
+/// The archive with the shared library `library` inside.
+///
+/// # Errors
+/// [`PackError`].
+pub fn archive<M: Model>(library: &[u8], extension: &str) -> Result<Vec<u8>, PackError> {
+    let files = [
+        (format!("binaries/{PLATFORM}/{}.{extension}", M::NAME), library.to_vec()),
+        ("documentation/licenses/license.spdx".into(), b"MIT OR Apache-2.0\n".to_vec()),
+        ("documentation/licenses/LICENSE-APACHE".into(), include_bytes!("../../../LICENSE-APACHE").to_vec()),
+        ("documentation/licenses/LICENSE-MIT".into(), include_bytes!("../../../LICENSE-MIT").to_vec()),
+        ("modelDescription.xml".into(), model_description::<M>()?),
+    ];
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .last_modified_time(DateTime::default())
+        .unix_permissions(0o644);
+    let mut zip = ZipWriter::new(io::Cursor::new(Vec::new()));
+    for (name, content) in files {
+        zip.start_file(name, options)?;
+        zip.write_all(&content)?;
+    }
+    Ok(zip.finish()?.into_inner())
+}
+
+fn file<T>(path: &str, result: io::Result<T>) -> Result<T, PackError> {
+    result.map_err(|source| PackError::File { path: path.into(), source })
+}
+
+fn command<M: Model>(arguments: &[String]) -> Result<(), PackError> {
+    let arguments: Vec<_> = arguments.iter().map(String::as_str).collect();
+    match arguments[..] {
+        ["describe"] => Ok(io::stdout().lock().write_all(&model_description::<M>()?)?),
+        ["pack", "--library", library, "--output", output] => {
+            let extension = Path::new(library).extension().and_then(|e| e.to_str()).unwrap_or("so");
+            let archive = archive::<M>(&file(library, fs::read(library))?, extension)?;
+            if let Some(folder) = Path::new(output).parent() {
+                file(output, fs::create_dir_all(folder))?;
+            }
+            file(output, fs::write(output, archive))
+        }
+        _ => Err(PackError::Usage(M::NAME)),
+    }
+}
+
+/// The program beside each FMU: writes its description, packs its archive.
+#[must_use]
+pub fn run<M: Model>() -> ExitCode {
+    let arguments: Vec<_> = std::env::args().skip(1).collect();
+    match command::<M>(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // nothing is left to report to if standard error is closed
+            let _ = writeln!(io::stderr(), "{}: {error}", M::NAME);
+            ExitCode::FAILURE
+        }
+    }
+}

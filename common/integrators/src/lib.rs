@@ -1,0 +1,63 @@
+//! One-step methods for `x' = f(t, x)` on arrays of fixed size.
+//!
+//! ```text
+//! x_(n+1) = x_n + h sum_i b_i k_i,   k_i = f(t_n + c_i h, x_n + h sum_j a_ij k_j)
+//! ```
+//! A method is one file with one table of numbers (`heun.rs`, `rk4.rs`, `dopri5.rs`); the two drivers (`fixed.rs`,
+//! `adaptive.rs`) know a method only as the `OneStep` of `one_step.rs`, so an implicit one is a third implementor
+//! beside `explicit.rs`. Nothing here knows a model or FMI, and nothing allocates.
+//!
+//! Sources: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. 1993
+//! (methods, step size control, dense output); I. F. D. Oliveira, R. H. C. Takahashi, ACM TOMS 47 (2020) (root finder).
+//! Left out: integration backwards in time, implicit and multistep methods.
+//!
+//! ```
+//! use integrators::{Method, Ode, Settings, Solver, Statistics};
+//!
+//! /// x' = -x
+//! struct Decay;
+//! impl Ode<1> for Decay {
+//!     type Error = std::convert::Infallible;
+//!     fn rhs(&self, _t: f64, x: &[f64; 1]) -> Result<[f64; 1], Self::Error> {
+//!         Ok([-x[0]])
+//!     }
+//! }
+//!
+//! let mut solver = Solver::new(Settings { method: Method::Rk4, step: 0.01, rtol: 1e-6, atol: 1e-9 })?;
+//! let (mut x, mut statistics) = ([1.0], Statistics::default());
+//! solver.advance(&Decay, 0.0, 1.0, &mut x, &mut statistics)?;
+//! assert!((x[0] - (-1.0_f64).exp()).abs() < 1e-10); // h^4 / 120 / e
+//! assert_eq!(statistics.rhs_evaluations, 400);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![forbid(unsafe_code)]
+
+mod adaptive;
+mod dense;
+mod dopri5;
+mod error;
+mod events;
+mod explicit;
+mod fixed;
+mod heun;
+mod method;
+mod ode;
+mod one_step;
+mod rk4;
+mod root;
+mod run;
+mod settings;
+mod solver;
+mod stability;
+mod statistics;
+
+pub use dense::Dense;
+pub use error::{SettingsError, StepError};
+pub use events::{Crossing, Indicators, Reached};
+pub use method::Method;
+pub use ode::Ode;
+pub use run::MAX_STEPS;
+pub use settings::Settings;
+pub use solver::{Memory, Solver};
+pub use stability::{Complex, MAX_AMPLIFICATION, largest_stable_step, violates};
+pub use statistics::Statistics;

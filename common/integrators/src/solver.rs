@@ -1,0 +1,174 @@
+//! The solver: settings and the little that a call leaves for the next one.
+
+use crate::adaptive::adaptive;
+use crate::dopri5::DOPRI5;
+use crate::events::{Indicators, Monitor, Reached};
+use crate::fixed::fixed;
+use crate::heun::HEUN;
+use crate::rk4::RK4;
+use crate::run::{Run, Show, Unwatched, Watch};
+use crate::{Dense, Method, Ode, Settings, SettingsError, Statistics, StepError};
+
+/// What an adaptive method remembers from call to call; fixed-step methods remember nothing.
+///
+/// Part of a saved state: with it a run goes on bit by bit as if it had not been interrupted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Memory {
+    /// Next step size [s]; 0: none yet, the next call guesses one.
+    pub step: f64,
+    /// Error of the last step in units of the tolerance.
+    pub error: f64,
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self {
+            step: 0.0,
+            error: 1e-4,
+        }
+    }
+}
+
+/// Integrates initial value problems with one method.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solver {
+    settings: Settings,
+    memory: Memory,
+}
+
+impl Solver {
+    /// A solver without a past.
+    ///
+    /// # Errors
+    /// A step size or tolerance that is not finite and positive.
+    pub fn new(settings: Settings) -> Result<Self, SettingsError> {
+        Ok(Self {
+            settings: settings.check()?,
+            memory: Memory::default(),
+        })
+    }
+
+    /// What the solver was made with.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// For a saved state.
+    #[must_use]
+    pub fn memory(&self) -> Memory {
+        self.memory
+    }
+
+    /// Goes on from a saved state.
+    pub fn restore(&mut self, memory: Memory) {
+        self.memory = memory;
+    }
+
+    /// Forgets the proposed step size: after a jump of the state or of an input.
+    pub fn reset(&mut self) {
+        self.memory = Memory::default();
+    }
+
+    /// Integrates `x` from `t` to exactly `t_end`.
+    ///
+    /// A fixed-step method takes `n = max(1, ceil(H/step - 1e-9))` equal steps of `H = t_end - t`; an adaptive one chooses
+    /// its steps and cuts the last two so that no tiny rest is left.
+    ///
+    /// # Errors
+    /// See [`StepError`]. Then `x`, the statistics and the solver's memory are as before the call.
+    #[inline]
+    pub fn advance<const N: usize, O: Ode<N>>(
+        &mut self,
+        ode: &O,
+        t: f64,
+        t_end: f64,
+        x: &mut [f64; N],
+        statistics: &mut Statistics,
+    ) -> Result<(), StepError<O::Error>> {
+        self.run(ode, [t, t_end], x, statistics, &mut Unwatched)
+            .map(|_| ())
+    }
+
+    /// As [`advance`](Self::advance), and shows the dense output of every accepted step to `each`.
+    ///
+    /// # Errors
+    /// As [`advance`](Self::advance); `each` has then seen the steps before the error.
+    pub fn advance_dense<const N: usize, O: Ode<N>>(
+        &mut self,
+        ode: &O,
+        t: f64,
+        t_end: f64,
+        x: &mut [f64; N],
+        statistics: &mut Statistics,
+        each: impl FnMut(&Dense<N>),
+    ) -> Result<(), StepError<O::Error>> {
+        self.run(ode, [t, t_end], x, statistics, &mut Show(each))
+            .map(|_| ())
+    }
+
+    /// As [`advance`](Self::advance), but stops just after the first zero crossing of any indicator.
+    ///
+    /// What counts as a crossing, also at the very start and end, is said at [`Indicators`]. After an event that changes
+    /// the state, call [`reset`](Self::reset).
+    ///
+    /// # Errors
+    /// As [`advance`](Self::advance), and an indicator that is not finite.
+    pub fn advance_until<const N: usize, const M: usize, O: Ode<N>, E: Indicators<N, M>>(
+        &mut self,
+        ode: &O,
+        events: &E,
+        t: f64,
+        t_end: f64,
+        x: &mut [f64; N],
+        statistics: &mut Statistics,
+    ) -> Result<Reached<M>, StepError<O::Error>> {
+        let mut monitor = Monitor::new(events);
+        let t = self.run(ode, [t, t_end], x, statistics, &mut monitor)?;
+        Ok(monitor
+            .which
+            .map_or(Reached::End, |which| Reached::Event { t, which }))
+    }
+
+    /// Works on copies and hands them over when all went well; the result is the time reached.
+    #[inline]
+    fn run<const N: usize, O: Ode<N>, W: Watch<N>>(
+        &mut self,
+        ode: &O,
+        [t, t_end]: [f64; 2],
+        x: &mut [f64; N],
+        statistics: &mut Statistics,
+        watch: &mut W,
+    ) -> Result<f64, StepError<O::Error>> {
+        if !(t.is_finite() && t_end.is_finite() && t <= t_end) {
+            return Err(StepError::Interval { t, t_end });
+        }
+        if t >= t_end {
+            return Ok(t);
+        }
+        let mut run = Run {
+            t,
+            x: *x,
+            statistics: *statistics,
+        };
+        let mut memory = self.memory;
+        let step = self.settings.step;
+        match self.settings.method {
+            Method::Heun => fixed(&HEUN, step, ode, &mut run, t_end, watch)?,
+            Method::Rk4 => fixed(&RK4, step, ode, &mut run, t_end, watch)?,
+            Method::Dopri5 => adaptive(
+                &DOPRI5,
+                &self.settings,
+                &mut memory,
+                ode,
+                &mut run,
+                t_end,
+                watch,
+            )?,
+        }
+        *x = run.x;
+        *statistics = run.statistics;
+        self.memory = memory;
+        Ok(run.t)
+    }
+}

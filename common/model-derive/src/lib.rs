@@ -1,0 +1,325 @@
+//! `#[derive(Variables)]` and `#[derive(Enumeration)]`: the variable table of a model from its fields.
+//!
+//! ```text
+//! #[derive(Variables)]
+//! #[variables(parameter)]                     parameter | input | output | local
+//! pub struct Param {
+//!     /// Sprung mass [kg]                    description and unit
+//!     #[var(name = "body.mass", start = 400.0, above = 0.0)]
+//!     pub m: f64,
+//!     #[var(prefix = "strut.")]               a nested group
+//!     pub strut: Strut,
+//! }
+//! ```
+//!
+//! Keys of `var`: `name`, `prefix`, `start` (a value, or `[x, y, z]`), `item` (an enumeration's
+//! variant), `min`, `max`, `above` (exclusive lower bound), `nominal`, `unit`, `tunable`,
+//! `discrete`, `local`, `exact`, `approx`, `depends` (a list of inputs or prefixes of inputs).
+//! A struct with a type parameter `S` is generic over the scalar.
+
+use proc_macro::TokenStream;
+use proc_macro2::{TokenStream as Tokens, TokenTree};
+use quote::{format_ident, quote};
+use syn::{Attribute, Data, DeriveInput, Expr, ExprLit, Field, Fields, Lit, Meta, parse_macro_input, spanned::Spanned};
+
+/// Implement `model::Variables` for a struct. See the crate documentation for the attributes.
+#[proc_macro_derive(Variables, attributes(variables, var))]
+pub fn variables(input: TokenStream) -> TokenStream {
+    let input = parse_macro_input!(input as DeriveInput);
+    expand_variables(&input).unwrap_or_else(|e| e.to_compile_error()).into()
+}
+
+/// Implement `model::Variables<f64>` and `From<i64>`-like access for a field-less enum whose items
+/// count from 1; item names are the variants in `snake_case`.
+#[proc_macro_derive(Enumeration)]
+pub fn enumeration(input: TokenStream) -> TokenStream {
+    let input = parse_macro_input!(input as DeriveInput);
+    expand_enumeration(&input).unwrap_or_else(|e| e.to_compile_error()).into()
+}
+
+/// First paragraph of the documentation, with the unit taken off its end.
+fn documentation(attrs: &[Attribute]) -> (String, Option<String>) {
+    let mut text = String::new();
+    for attr in attrs.iter().filter(|a| a.path().is_ident("doc")) {
+        if let Meta::NameValue(nv) = &attr.meta
+            && let Expr::Lit(ExprLit { lit: Lit::Str(s), .. }) = &nv.value
+        {
+            let line = s.value();
+            if line.trim().is_empty() {
+                break;
+            }
+            if !text.is_empty() {
+                text.push(' ');
+            }
+            text.push_str(line.trim());
+        }
+    }
+    if let Some(open) = text.rfind('[')
+        && text.ends_with(']')
+    {
+        let unit = text[open + 1..text.len() - 1].to_string();
+        let description = text[..open].trim().to_string();
+        return (description, Some(unit));
+    }
+    (text, None)
+}
+
+#[derive(Default)]
+struct FieldAttributes {
+    prefix: String,
+    unit: Option<String>,
+    start: Vec<Tokens>,
+    min: Option<Tokens>,
+    max: Option<Tokens>,
+    nominal: Option<Tokens>,
+    tunable: bool,
+    discrete: bool,
+    local: bool,
+    initial: Option<&'static str>,
+    depends: Vec<String>,
+}
+
+/// A start value as f64: Booleans become 0 and 1.
+fn number(e: &Expr) -> Tokens {
+    match e {
+        Expr::Lit(ExprLit { lit: Lit::Bool(b), .. }) => {
+            let v = f64::from(u8::from(b.value));
+            quote!(#v)
+        }
+        Expr::Lit(ExprLit { lit: Lit::Int(i), .. }) => quote!(#i as f64),
+        e => quote!(#e),
+    }
+}
+
+fn field_attributes(field: &Field) -> syn::Result<FieldAttributes> {
+    let mut a = FieldAttributes::default();
+    for attr in field.attrs.iter().filter(|a| a.path().is_ident("var")) {
+        attr.parse_nested_meta(|meta| {
+            let key = meta.path.get_ident().map(ToString::to_string).unwrap_or_default();
+            match key.as_str() {
+                "tunable" => a.tunable = true,
+                "discrete" => a.discrete = true,
+                "local" => a.local = true,
+                "exact" => a.initial = Some("Exact"),
+                "approx" => a.initial = Some("Approx"),
+                "name" | "prefix" => a.prefix = meta.value()?.parse::<syn::LitStr>()?.value(),
+                "unit" => a.unit = Some(meta.value()?.parse::<syn::LitStr>()?.value()),
+                "item" => {
+                    let e: Expr = meta.value()?.parse()?;
+                    a.start = vec![quote!(#e as i64 as f64)];
+                }
+                "start" => {
+                    let e: Expr = meta.value()?.parse()?;
+                    a.start = match &e {
+                        Expr::Array(list) => list.elems.iter().map(number).collect(),
+                        e => vec![number(e)],
+                    };
+                }
+                "min" | "max" | "nominal" | "above" => {
+                    let e = number(&meta.value()?.parse()?);
+                    match key.as_str() {
+                        "min" => a.min = Some(e),
+                        "max" => a.max = Some(e),
+                        "nominal" => a.nominal = Some(e),
+                        // the smallest normal number above an exclusive bound of zero
+                        _ => a.min = Some(quote!((#e) + f64::MIN_POSITIVE)),
+                    }
+                }
+                "depends" => {
+                    let list: syn::ExprArray = meta.value()?.parse()?;
+                    for e in list.elems {
+                        if let Expr::Lit(ExprLit { lit: Lit::Str(s), .. }) = e {
+                            a.depends.push(s.value());
+                        } else {
+                            return Err(meta.error("depends takes a list of names"));
+                        }
+                    }
+                }
+                _ => return Err(meta.error("unknown key")),
+            }
+            Ok(())
+        })?;
+    }
+    Ok(a)
+}
+
+/// The type with the scalar parameter replaced by f64.
+fn concrete(tokens: Tokens, scalar: Option<&syn::Ident>) -> Tokens {
+    tokens
+        .into_iter()
+        .map(|tree| match (tree, scalar) {
+            (TokenTree::Ident(i), Some(s)) if i == *s => TokenTree::Ident(format_ident!("f64")),
+            (TokenTree::Group(g), _) => {
+                TokenTree::Group(proc_macro2::Group::new(g.delimiter(), concrete(g.stream(), scalar)))
+            }
+            (tree, _) => tree,
+        })
+        .collect()
+}
+
+fn option(v: Option<&Tokens>) -> Tokens {
+    v.map_or_else(|| quote!(None), |v| quote!(Some(#v)))
+}
+
+fn expand_variables(input: &DeriveInput) -> syn::Result<Tokens> {
+    let name = &input.ident;
+    let Data::Struct(data) = &input.data else {
+        return Err(syn::Error::new(name.span(), "Variables is derived for structs"));
+    };
+    let Fields::Named(fields) = &data.fields else {
+        return Err(syn::Error::new(name.span(), "fields need names"));
+    };
+    let scalar = input.generics.type_params().next().map(|p| p.ident.clone());
+    let mut causality = "Inherit";
+    for attr in input.attrs.iter().filter(|a| a.path().is_ident("variables")) {
+        attr.parse_nested_meta(|meta| {
+            causality = match meta.path.get_ident().map(ToString::to_string).as_deref() {
+                Some("parameter") => "Parameter",
+                Some("input") => "Input",
+                Some("output") => "Output",
+                Some("local") => "Local",
+                _ => return Err(meta.error("parameter, input, output or local")),
+            };
+            Ok(())
+        })?;
+    }
+
+    let (mut lengths, mut fills, mut loads, mut stores) = (vec![], vec![], vec![], vec![]);
+    let number_type = scalar.as_ref().map_or_else(|| quote!(f64), |s| quote!(#s));
+    for field in &fields.named {
+        let ident = field.ident.as_ref().ok_or_else(|| syn::Error::new(field.span(), "name"))?;
+        let a = field_attributes(field)?;
+        let ty = &field.ty;
+        let at_f64 = concrete(quote!(#ty), scalar.as_ref());
+        let table = quote!(<#at_f64 as ::model::Variables<f64>>::TABLE);
+        let (description, unit) = documentation(&field.attrs);
+        let unit = a.unit.or(unit).unwrap_or_default();
+        let unit = if unit == "1" || unit == "-" { String::new() } else { unit };
+        let (prefix, start, depends, tunable, discrete) = (&a.prefix, &a.start, &a.depends, a.tunable, a.discrete);
+        let field_causality = format_ident!("{}", if a.local { "Local" } else { causality });
+        let initial = format_ident!("{}", a.initial.unwrap_or("Calculated"));
+        let (min, max, nominal) = (option(a.min.as_ref()), option(a.max.as_ref()), option(a.nominal.as_ref()));
+        lengths.push(quote!(#table.len()));
+        fills.push(quote! {
+            table = ::model::fill(table, at, #table, &::model::Attributes {
+                prefix: #prefix,
+                description: #description,
+                unit: #unit,
+                causality: ::model::Causality::#field_causality,
+                tunable: #tunable,
+                discrete: #discrete,
+                initial: ::model::Initial::#initial,
+                start: &[#(#start),*],
+                min: #min,
+                max: #max,
+                nominal: #nominal,
+                depends: &[#(#depends),*],
+            });
+            at += #table.len();
+        });
+        loads.push(quote! {
+            let #ident = <#ty as ::model::Variables<#number_type>>::load(&values[at..]);
+            at += #table.len();
+        });
+        stores.push(quote! {
+            ::model::Variables::<#number_type>::store(&self.#ident, &mut values[at..]);
+            at += #table.len();
+        });
+    }
+    let idents: Vec<_> = fields.named.iter().map(|f| &f.ident).collect();
+    let (generics, target) = match &scalar {
+        Some(s) => (quote!(<#s: ::model::Scalar>), quote!(#name<#s>)),
+        None => (quote!(), quote!(#name)),
+    };
+    let default = (causality == "Parameter" && scalar.is_none()).then(|| {
+        quote! {
+            impl Default for #name {
+                fn default() -> Self {
+                    let start: Vec<f64> =
+                        <Self as ::model::Variables<f64>>::TABLE.iter().map(|v| v.start).collect();
+                    <Self as ::model::Variables<f64>>::load(&start)
+                }
+            }
+        }
+    });
+    Ok(quote! {
+        impl #generics ::model::Variables<#number_type> for #target {
+            const TABLE: &'static [::model::Entry] = &{
+                const N: usize = 0 #(+ #lengths)*;
+                let mut table = [::model::Entry::scalar("", ::model::Kind::Float64); N];
+                let mut at = 0;
+                #(#fills)*
+                assert!(at == N);
+                table
+            };
+            #[inline]
+            fn load(values: &[#number_type]) -> Self {
+                let mut at = 0;
+                #(#loads)*
+                let _ = at;
+                Self { #(#idents),* }
+            }
+            #[inline]
+            fn store(&self, values: &mut [#number_type]) {
+                let mut at = 0;
+                #(#stores)*
+                let _ = at;
+            }
+        }
+        #default
+    })
+}
+
+/// `SphericalRod` -> `spherical_rod`.
+fn snake_case(name: &str) -> String {
+    let mut out = String::new();
+    for (i, c) in name.char_indices() {
+        if c.is_uppercase() && i > 0 {
+            out.push('_');
+        }
+        out.extend(c.to_lowercase());
+    }
+    out
+}
+
+fn expand_enumeration(input: &DeriveInput) -> syn::Result<Tokens> {
+    let name = &input.ident;
+    let Data::Enum(data) = &input.data else {
+        return Err(syn::Error::new(name.span(), "Enumeration is derived for enums"));
+    };
+    let type_name = name.to_string();
+    let (description, _) = documentation(&input.attrs);
+    let mut items = vec![];
+    for v in &data.variants {
+        let ident = &v.ident;
+        let (text, _) = documentation(&v.attrs);
+        let item = snake_case(&ident.to_string());
+        items.push(quote! {
+            ::model::Item { name: #item, value: #name::#ident as i64, description: #text }
+        });
+    }
+    let variants: Vec<_> = data.variants.iter().map(|v| &v.ident).collect();
+    let first = variants.first().ok_or_else(|| syn::Error::new(name.span(), "no items"))?;
+    Ok(quote! {
+        impl ::model::Variables<f64> for #name {
+            const TABLE: &'static [::model::Entry] = &[{
+                static TYPE: ::model::EnumType = ::model::EnumType {
+                    name: #type_name,
+                    description: #description,
+                    items: &[#(#items),*],
+                };
+                let mut entry = ::model::Entry::scalar("", ::model::Kind::Enumeration(&TYPE));
+                entry.start = #name::#first as i64 as f64;
+                entry
+            }];
+            fn load(values: &[f64]) -> Self {
+                let index = values[0];
+                #(if index == #name::#variants as i64 as f64 { return #name::#variants; })*
+                unreachable!("values are checked when they are set")
+            }
+            fn store(&self, values: &mut [f64]) {
+                values[0] = *self as i64 as f64;
+            }
+        }
+    })
+}

@@ -1,0 +1,49 @@
+//! What can go wrong in a model; each variant carries the values that make it fixable.
+
+use mechanics::{InconsistentClosure, NotPositiveDefinite};
+
+/// The equations have no value here.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum EvaluationError {
+    /// A length or another divisor became too small.
+    #[error("{quantity} vanishes: {value:.3e} (must stay above {limit:.0e})")]
+    Vanishes {
+        /// What became small
+        quantity: &'static str,
+        /// Its value
+        value: f64,
+        /// Its smallest usable value
+        limit: f64,
+    },
+    /// The inertia of an element admits no unique motion.
+    #[error("{element}: {source}")]
+    Inertia {
+        /// Name of the element
+        element: &'static str,
+        /// The cause
+        source: NotPositiveDefinite,
+    },
+    /// A loop cannot be closed on accelerations.
+    #[error(transparent)]
+    Closure(#[from] InconsistentClosure),
+}
+
+/// Parameters or start values that do not fit together.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ParameterError {
+    /// One value excludes the others.
+    #[error("{variable} = {value} is refused: {reason}; allowed: {allowed}")]
+    Refused {
+        /// Name of the variable
+        variable: &'static str,
+        /// Its value
+        value: f64,
+        /// Why it cannot be used
+        reason: String,
+        /// What would be accepted
+        allowed: String,
+    },
+    /// The equations have no value at the start.
+    #[error("no consistent start: {0}")]
+    Start(#[from] EvaluationError),
+}

@@ -1,0 +1,232 @@
+//! The model trait and the system trait.
+
+use mechanics::Scalar;
+
+use crate::{EvaluationError, ParameterError, Spectrum, Variables};
+
+/// A sensible run of the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Experiment {
+    /// Stop time of a run from 0 [s]
+    pub stop: f64,
+    /// Communication step [s]
+    pub step: f64,
+}
+
+/// Output variables that are computed together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Group {
+    /// Positions, velocities, states
+    Motion,
+    /// F0 and M of follower ports
+    Inertia,
+    /// Accelerations and forces
+    Dynamics,
+    /// Energies
+    Energy,
+}
+
+impl Group {
+    /// All groups, in the order of the variable table.
+    pub const ALL: [Self; 4] = [Self::Motion, Self::Inertia, Self::Dynamics, Self::Energy];
+}
+
+/// A physical system: its parameters, variables and, inside, one [`System`] for each structure it
+/// can take (a joint kind, plane or space).
+pub trait Model: Clone + Sized + 'static {
+    /// Name of the model, an identifier
+    const NAME: &'static str;
+    /// One sentence
+    const DESCRIPTION: &'static str;
+    /// A sensible run
+    const EXPERIMENT: Experiment;
+    /// Constants of a run
+    type Parameters: Variables<f64>;
+    /// Inputs
+    type Inputs<S: Scalar>: Variables<S>;
+    /// Positions, velocities, states
+    type Motion<S: Scalar>: Variables<S>;
+    /// F0 and M of follower ports
+    type Inertia<S: Scalar>: Variables<S>;
+    /// Accelerations and forces
+    type Dynamics<S: Scalar>: Variables<S>;
+    /// Energies
+    type Energy<S: Scalar>: Variables<S>;
+    /// Discrete states, changed by [`System::update`] only
+    type Discrete: Copy + Default + PartialEq + std::fmt::Debug;
+
+    /// Check the parameters and prepare all constants.
+    ///
+    /// # Errors
+    /// [`ParameterError`] for values that do not fit together.
+    fn new(parameters: &Self::Parameters) -> Result<Self, ParameterError>;
+
+    /// Take over changed tunable parameters; nothing else may change.
+    fn retune(&mut self, parameters: &Self::Parameters);
+
+    /// Cases that are allowed but probably not meant, as log messages.
+    fn warnings(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Run a job on the system that the parameters have chosen.
+    fn with_system<V: Visitor<Self>>(&self, visitor: V) -> V::Output;
+}
+
+/// A job that needs the system's number of states at the type level.
+pub trait Visitor<M: Model> {
+    /// What the job gives
+    type Output;
+    /// Do the job.
+    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) -> Self::Output;
+}
+
+/// The equations: pure functions of time, states `x`, inputs `u` and discrete states `d`.
+///
+/// `N` counts the states (energy integrals included), `Z` the event indicators.
+pub trait System<const N: usize, const Z: usize> {
+    /// The model that these equations belong to
+    type Model: Model;
+    /// Eigenvalue solver for the state Jacobian
+    type Spectrum: Spectrum<N>;
+
+    /// Consistent states at `t`, from the start values of the motion variables.
+    ///
+    /// # Errors
+    /// [`ParameterError`] if no consistent start exists.
+    fn start(
+        &self,
+        t: f64,
+        given: &<Self::Model as Model>::Motion<f64>,
+    ) -> Result<([f64; N], <Self::Model as Model>::Discrete), ParameterError>;
+
+    /// Time derivative of the states.
+    ///
+    /// # Errors
+    /// [`EvaluationError`] where the equations have no value; the same for the other functions.
+    fn rates<S: Scalar>(
+        &self,
+        t: S,
+        x: &[S; N],
+        u: &<Self::Model as Model>::Inputs<S>,
+        d: &<Self::Model as Model>::Discrete,
+    ) -> Result<[S; N], EvaluationError>;
+
+    /// Positions, velocities, states.
+    ///
+    /// # Errors
+    /// See [`System::rates`].
+    fn motion<S: Scalar>(
+        &self,
+        t: S,
+        x: &[S; N],
+        u: &<Self::Model as Model>::Inputs<S>,
+        d: &<Self::Model as Model>::Discrete,
+    ) -> Result<<Self::Model as Model>::Motion<S>, EvaluationError>;
+
+    /// F0 and M of follower ports; never reads an acceleration input.
+    ///
+    /// # Errors
+    /// See [`System::rates`].
+    fn inertia<S: Scalar>(
+        &self,
+        t: S,
+        x: &[S; N],
+        u: &<Self::Model as Model>::Inputs<S>,
+        d: &<Self::Model as Model>::Discrete,
+    ) -> Result<<Self::Model as Model>::Inertia<S>, EvaluationError>;
+
+    /// Accelerations and forces.
+    ///
+    /// # Errors
+    /// See [`System::rates`].
+    fn dynamics<S: Scalar>(
+        &self,
+        t: S,
+        x: &[S; N],
+        u: &<Self::Model as Model>::Inputs<S>,
+        d: &<Self::Model as Model>::Discrete,
+    ) -> Result<<Self::Model as Model>::Dynamics<S>, EvaluationError>;
+
+    /// Energies.
+    ///
+    /// # Errors
+    /// See [`System::rates`].
+    fn energy<S: Scalar>(
+        &self,
+        t: S,
+        x: &[S; N],
+        u: &<Self::Model as Model>::Inputs<S>,
+        d: &<Self::Model as Model>::Discrete,
+    ) -> Result<<Self::Model as Model>::Energy<S>, EvaluationError>;
+
+    /// Names of the states: variables of the motion group, or energy integrals.
+    fn state_names(&self) -> [String; N];
+
+    /// Typical magnitude of each state for error control; infinite: does not count.
+    fn nominals(&self) -> [f64; N] {
+        [1.0; N]
+    }
+
+    /// Bring the states back on their manifold after a step; true if they changed.
+    ///
+    /// # Errors
+    /// See [`System::rates`].
+    fn project(&self, _t: f64, _x: &mut [f64; N]) -> Result<bool, EvaluationError> {
+        Ok(false)
+    }
+
+    /// Functions whose sign changes are events.
+    fn indicators(
+        &self,
+        _t: f64,
+        _x: &[f64; N],
+        _u: &<Self::Model as Model>::Inputs<f64>,
+        _d: &<Self::Model as Model>::Discrete,
+    ) -> [f64; Z] {
+        [1.0; Z]
+    }
+
+    /// The next time at which [`System::update`] has to be called, if known.
+    fn next_event(&self, _d: &<Self::Model as Model>::Discrete) -> Option<f64> {
+        None
+    }
+
+    /// Discrete states after the event at `t`; may change `x`.
+    fn update(
+        &self,
+        _t: f64,
+        _x: &mut [f64; N],
+        _u: &<Self::Model as Model>::Inputs<f64>,
+        d: &<Self::Model as Model>::Discrete,
+    ) -> <Self::Model as Model>::Discrete {
+        *d
+    }
+}
+
+/// One group of outputs into a flat slice: the single way by which values leave a system.
+pub trait Outputs<const N: usize, const Z: usize>: System<N, Z> {
+    /// Evaluate `group` and write its values in table order.
+    ///
+    /// # Errors
+    /// [`EvaluationError`] where the equations have no value.
+    fn evaluate<S: Scalar>(
+        &self,
+        group: Group,
+        t: S,
+        x: &[S; N],
+        u: &<Self::Model as Model>::Inputs<S>,
+        d: &<Self::Model as Model>::Discrete,
+        values: &mut [S],
+    ) -> Result<(), EvaluationError> {
+        match group {
+            Group::Motion => self.motion(t, x, u, d)?.store(values),
+            Group::Inertia => self.inertia(t, x, u, d)?.store(values),
+            Group::Dynamics => self.dynamics(t, x, u, d)?.store(values),
+            Group::Energy => self.energy(t, x, u, d)?.store(values),
+        }
+        Ok(())
+    }
+}
+
+impl<const N: usize, const Z: usize, Y: System<N, Z>> Outputs<N, Z> for Y {}

@@ -1,0 +1,6 @@
+//! The physical systems of the suite, one folder each. Equations only; no interface standard.
+
+#![forbid(unsafe_code)]
+#![allow(non_snake_case, reason = "names are the papers' symbols: F_A, M, q_ddot")]
+
+pub mod suspension;

@@ -1,0 +1,124 @@
+//! The internal load: a law of time for the force at P.
+//!
+//! ```text
+//! F_i = offset_i + amplitude_i sin(omega_i t + phase_i)
+//!       + pulse.amplitude_i sin(pi (t - start)/duration)   inside [start, start + duration]
+//! ```
+
+use std::f64::consts::PI;
+
+use mechanics::{Dim, Scalar, Space, Vector};
+
+use super::Parameters;
+
+/// Where the time stands relative to the pulse; changed by the time events at both ends.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum PulsePhase {
+    /// Not yet begun
+    #[default]
+    Before,
+    /// Inside
+    During,
+    /// Over, or no pulse at all
+    After,
+}
+
+/// The load law in the space of dimension `D`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LoadLaw<const D: usize> {
+    offset: Vector<f64, D>,
+    amplitude: Vector<f64, D>,
+    omega: Vector<f64, D>,
+    phase: Vector<f64, D>,
+    pulse_amplitude: Vector<f64, D>,
+    pulse_start: f64,
+    pulse_duration: f64,
+}
+
+impl<const D: usize> LoadLaw<D>
+where
+    Dim<D>: Space<D>,
+{
+    pub(super) fn new(p: &Parameters) -> Self {
+        let part = |v| Dim::<D>::restrict(&v);
+        Self {
+            offset: part(p.force_offset),
+            amplitude: part(p.force_amplitude),
+            omega: part(p.force_omega),
+            phase: part(p.force_phase),
+            pulse_amplitude: part(p.pulse_amplitude),
+            pulse_start: p.pulse_start,
+            pulse_duration: p.pulse_duration,
+        }
+    }
+
+    /// Force at P [N].
+    #[inline]
+    pub(super) fn force<S: Scalar>(&self, t: S, phase: PulsePhase) -> Vector<S, D> {
+        let mut F = self.offset.map(S::lift);
+        for i in 0..D {
+            if !self.amplitude[i].vanishes() {
+                F[i] += (t * self.omega[i] + self.phase[i]).sin() * self.amplitude[i];
+            }
+        }
+        if phase == PulsePhase::During {
+            let shape = ((t - self.pulse_start) * (PI / self.pulse_duration)).sin();
+            F += self.pulse_amplitude.map(|a| shape * a);
+        }
+        F
+    }
+
+    /// Time of the next kink [s].
+    pub(super) fn next_event(&self, phase: PulsePhase) -> Option<f64> {
+        match phase {
+            PulsePhase::Before => Some(self.pulse_start),
+            PulsePhase::During => Some(self.pulse_start + self.pulse_duration),
+            PulsePhase::After => None,
+        }
+    }
+
+    /// Phase from `t` on; a pulse of zero duration or zero amplitude never begins.
+    pub(super) fn phase(&self, t: f64) -> PulsePhase {
+        let nothing = self.pulse_duration <= 0.0 || self.pulse_amplitude.iter().all(|a| a.vanishes());
+        if nothing || t >= self.pulse_start + self.pulse_duration {
+            PulsePhase::After
+        } else if t >= self.pulse_start {
+            PulsePhase::During
+        } else {
+            PulsePhase::Before
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn law(duration: f64) -> LoadLaw<2> {
+        let mut p = Parameters::default();
+        p.force_amplitude.z = 0.0;
+        p.pulse_amplitude.z = 800.0;
+        p.pulse_start = 0.5;
+        p.pulse_duration = duration;
+        LoadLaw::new(&p)
+    }
+
+    /// Half-sine: zero at both ends, the amplitude in the middle; the events lead through it.
+    #[test]
+    fn pulse_is_a_half_sine_between_its_events() {
+        let law = law(0.08);
+        let mut phase = law.phase(0.0);
+        assert_eq!(law.next_event(phase), Some(0.5));
+        phase = law.phase(0.5);
+        assert!(law.force(0.5, phase).y.abs() < 1e-12);
+        assert!((law.force(0.54, phase).y - 800.0).abs() < 1e-9);
+        phase = law.phase(law.next_event(phase).expect("the pulse ends"));
+        assert_eq!((phase, law.next_event(phase)), (PulsePhase::After, None));
+        assert!(law.force(0.6, phase).y.vanishes());
+    }
+
+    #[test]
+    fn zero_duration_means_no_pulse() {
+        assert_eq!(law(0.0).phase(0.0), PulsePhase::After);
+    }
+}

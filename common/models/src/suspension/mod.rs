@@ -1,0 +1,25 @@
+//! Wheel suspension: rods, carrier and strut, and the double wishbone made of them.
+//!
+//! Source: F. E. Kracht, A. Dandekar, T. Bruckmann, D. Schramm (2017), *Echtzeitfähige
+//! objektorientierte Modellbildung am Beispiel einer Fahrzeug-Radaufhängung*, 3rd D-A-CH IFToMM
+//! conference, Chemnitz. The equations were re-derived: the printed ones hold in the plane only
+//! (they ignore the moment of the universal joint).
+//!
+//! World frame E right-handed, z up; plane scenes live in x-z. Equation numbers (1)-(12c) are those
+//! of [`mechanics::joint`] and [`mechanics::element`], (15)-(16) of [`mechanics::spring`], (17) of
+//! [`mechanics::chain`], (18) of [`mechanics::closure`].
+
+mod coordinates;
+mod double_wishbone;
+mod load;
+mod parameters;
+mod start;
+mod variables;
+mod wishbone;
+
+pub use double_wishbone::DoubleWishbone;
+pub use load::PulsePhase;
+pub use parameters::{
+    ArmJoint, CarrierJoint, ClosureKind, ForceKind, Parameters, PreloadMode, SceneMotion, StabilisationKind,
+};
+pub use variables::{Dynamics, Energy, Inputs, Motion};

@@ -1,0 +1,1 @@
+"""Independent solutions for cases that no published or stored reference covers."""
