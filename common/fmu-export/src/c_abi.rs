@@ -5,7 +5,10 @@
 
 #![allow(unsafe_code, reason = "C interface; every block states why it is sound")]
 #![allow(non_snake_case, reason = "names of the standard")]
-#![allow(clippy::missing_safety_doc, reason = "one contract for all: the pointers follow FMI 3.0")]
+#![allow(
+    clippy::missing_safety_doc,
+    reason = "one contract for all: the pointers follow FMI 3.0"
+)]
 #![allow(clippy::too_many_arguments, reason = "signatures of the standard")]
 
 use std::ffi::{CStr, CString, c_char, c_void};
@@ -31,8 +34,14 @@ const FATAL_CATEGORY: &CStr = c"logStatusFatal";
 /// The log categories with their meaning, as declared in the model description.
 pub const LOG_CATEGORIES: [(&CStr, &str); 4] = [
     (WARNING_CATEGORY, "Allowed, but probably not meant"),
-    (DISCARD_CATEGORY, "A step or value is refused; nothing has changed and the run may go on"),
-    (ERROR_CATEGORY, "A wrong call, or parameters that do not fit together"),
+    (
+        DISCARD_CATEGORY,
+        "A step or value is refused; nothing has changed and the run may go on",
+    ),
+    (
+        ERROR_CATEGORY,
+        "A wrong call, or parameters that do not fit together",
+    ),
     (FATAL_CATEGORY, "Internal error; the instance is lost"),
 ];
 
@@ -151,6 +160,7 @@ unsafe fn text(pointer: *const c_char) -> String {
 }
 
 #[doc(hidden)]
+#[must_use]
 pub fn fmi3GetVersion() -> *const c_char {
     c"3.0".as_ptr()
 }
@@ -162,16 +172,26 @@ pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
     environment: *mut c_void,
     log_message: Option<LogMessage>,
 ) -> *mut c_void {
-    let log = Log { environment, callback: log_message, categories: None };
+    let log = Log {
+        environment,
+        callback: log_message,
+        categories: None,
+    };
     let refuse = |message: &str| {
-        log.send(Status::Error, ERROR_CATEGORY, &format!("fmi3InstantiateCoSimulation: {message}"));
+        log.send(
+            Status::Error,
+            ERROR_CATEGORY,
+            &format!("fmi3InstantiateCoSimulation: {message}"),
+        );
         std::ptr::null_mut()
     };
     let created = catch_unwind(|| {
         // SAFETY: FMI: the token is a null-terminated string.
         let (given, expected) = (unsafe { text(token) }, Instance::<M>::token());
         if given != expected {
-            return Err(format!("instantiationToken is \"{given}\"; this binary belongs to \"{expected}\""));
+            return Err(format!(
+                "instantiationToken is \"{given}\"; this binary belongs to \"{expected}\""
+            ));
         }
         if event_mode_used != 0 {
             return Err("eventModeUsed = true is not supported (hasEventMode is not declared)".into());
@@ -192,8 +212,16 @@ pub unsafe fn refuse_instance(
     environment: *mut c_void,
     log_message: Option<LogMessage>,
 ) -> *mut c_void {
-    let log = Log { environment, callback: log_message, categories: None };
-    log.send(Status::Error, ERROR_CATEGORY, &format!("{function} is not supported: {reason}"));
+    let log = Log {
+        environment,
+        callback: log_message,
+        categories: None,
+    };
+    log.send(
+        Status::Error,
+        ERROR_CATEGORY,
+        &format!("{function} is not supported: {reason}"),
+    );
     std::ptr::null_mut()
 }
 
@@ -220,8 +248,14 @@ pub unsafe fn fmi3SetDebugLogging<M: Model>(
             let mut chosen = Vec::with_capacity(n);
             for name in names {
                 let name = text(*name);
-                let Some((category, _)) = LOG_CATEGORIES.iter().find(|(c, _)| c.to_bytes() == name.as_bytes()) else {
-                    return Err(Fault::Unsupported { function: "this log category", reason: "see LogCategories in the model description" });
+                let Some((category, _)) = LOG_CATEGORIES
+                    .iter()
+                    .find(|(c, _)| c.to_bytes() == name.as_bytes())
+                else {
+                    return Err(Fault::Unsupported {
+                        function: "this log category",
+                        reason: "see LogCategories in the model description",
+                    });
                 };
                 chosen.push(CString::from(*category));
             }
@@ -241,7 +275,8 @@ pub unsafe fn fmi3EnterInitializationMode<M: Model>(
     // SAFETY: FMI instance, checked for null by `call`; the same for the functions below.
     unsafe {
         call::<M>(instance, &phase::ENTER_INITIALIZATION, |c| {
-            c.instance.enter_initialization(start, (stop_defined != 0).then_some(stop))
+            c.instance
+                .enter_initialization(start, (stop_defined != 0).then_some(stop))
         })
     }
 }
@@ -260,7 +295,11 @@ pub unsafe fn fmi3ExitInitializationMode<M: Model>(instance: *mut c_void) -> Sta
             Ok(())
         })
     };
-    if status == Status::Ok && warned { Status::Warning } else { status }
+    if status == Status::Ok && warned {
+        Status::Warning
+    } else {
+        status
+    }
 }
 
 #[doc(hidden)]
@@ -327,7 +366,8 @@ pub unsafe fn fmi3GetFloat64<M: Model>(
     unsafe {
         call::<M>(instance, &phase::GET_FLOAT64, |c| {
             let references = array("valueReferences", references, n)?;
-            c.instance.get_float64(references, array_mut("values", values, n_values)?)
+            c.instance
+                .get_float64(references, array_mut("values", values, n_values)?)
         })
     }
 }
@@ -343,9 +383,13 @@ pub unsafe fn fmi3SetFloat64<M: Model>(
     // SAFETY: FMI pointers, checked for null.
     unsafe {
         call::<M>(instance, &phase::SET_FLOAT64, |c| {
-            let (references, values) = (array("valueReferences", references, n)?, array("values", values, n_values)?);
+            let (references, values) = (
+                array("valueReferences", references, n)?,
+                array("values", values, n_values)?,
+            );
             crate::instance::same_length(n, n_values)?;
-            c.instance.set(references, "Float64", |k| k == Kind::Float64, |i| values[i])
+            c.instance
+                .set(references, "Float64", |k| k == Kind::Float64, |i| values[i])
         })
     }
 }
@@ -368,7 +412,12 @@ macro_rules! whole_number_access {
                     let values = array_mut("values", values, n_values)?;
                     crate::instance::same_length(n, n_values)?;
                     let to: fn(f64) -> $c_type = $to;
-                    c.instance.get_whole(references, $called, |k| matches!(k, $is), |i, v| values[i] = to(v))
+                    c.instance.get_whole(
+                        references,
+                        $called,
+                        |k| matches!(k, $is),
+                        |i, v| values[i] = to(v),
+                    )
                 })
             }
         }
@@ -388,16 +437,25 @@ macro_rules! whole_number_access {
                     let values = array("values", values, n_values)?;
                     crate::instance::same_length(n, n_values)?;
                     let from: fn($c_type) -> f64 = $from;
-                    c.instance.set(references, $called, |k| matches!(k, $is), |i| from(values[i]))
+                    c.instance.set(
+                        references,
+                        $called,
+                        |k| matches!(k, $is),
+                        |i| from(values[i]),
+                    )
                 })
             }
         }
     };
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "stored values are whole and below 2^53")]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    reason = "stored values are whole and below 2^53"
+)]
 mod whole {
-    use super::*;
+    use super::{Bool, Kind, Model, Status, array, array_mut, c_void, call, phase};
     whole_number_access!(fmi3GetInt64 GET_INT64 fmi3SetInt64 SET_INT64 i64, "Int64", Kind::Int64 | Kind::Enumeration(_), |v| v as f64, |v| v as i64);
     whole_number_access!(fmi3GetInt32 GET_INT32 fmi3SetInt32 SET_INT32 i32, "Int32", Kind::Int32, f64::from, |v| v as i32);
     whole_number_access!(fmi3GetBoolean GET_BOOLEAN fmi3SetBoolean SET_BOOLEAN Bool, "Boolean", Kind::Boolean, |v| f64::from(u8::from(v != 0)), |v| u8::from(v > 0.5));
@@ -407,7 +465,13 @@ pub use whole::*;
 
 /// Get or Set of a type of which there are no variables: right for none, an error for any.
 #[doc(hidden)]
-pub unsafe fn no_variables<M: Model>(instance: *mut c_void, get: bool, called: &'static str, references: *const u32, n: usize) -> Status {
+pub unsafe fn no_variables<M: Model>(
+    instance: *mut c_void,
+    get: bool,
+    called: &'static str,
+    references: *const u32,
+    n: usize,
+) -> Status {
     let rule = if get { &phase::GET_OTHER } else { &phase::SET_OTHER };
     // SAFETY: FMI pointers, checked for null.
     unsafe {
@@ -420,9 +484,17 @@ pub unsafe fn no_variables<M: Model>(instance: *mut c_void, get: bool, called: &
 
 /// A function that this FMU does not declare.
 #[doc(hidden)]
-pub unsafe fn unsupported<M: Model>(instance: *mut c_void, function: &'static str, reason: &'static str) -> Status {
+pub unsafe fn unsupported<M: Model>(
+    instance: *mut c_void,
+    function: &'static str,
+    reason: &'static str,
+) -> Status {
     // SAFETY: FMI instance, checked for null by `call`.
-    unsafe { call::<M>(instance, &phase::UNSUPPORTED, |_| Err(Fault::Unsupported { function, reason })) }
+    unsafe {
+        call::<M>(instance, &phase::UNSUPPORTED, |_| {
+            Err(Fault::Unsupported { function, reason })
+        })
+    }
 }
 
 #[doc(hidden)]
@@ -445,7 +517,10 @@ pub unsafe fn fmi3SetFMUState<M: Model>(instance: *mut c_void, state: *mut c_voi
     // SAFETY: a state that is not null came from `fmi3GetFMUState` and was not freed (FMI).
     unsafe {
         call::<M>(instance, &phase::SET_FMU_STATE, |c| {
-            let saved = state.cast::<State<M>>().as_ref().ok_or(Fault::Null { argument: "FMUState" })?;
+            let saved = state
+                .cast::<State<M>>()
+                .as_ref()
+                .ok_or(Fault::Null { argument: "FMUState" })?;
             c.instance.restore(saved);
             Ok(())
         })
@@ -485,13 +560,22 @@ pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
             let unknowns = array("unknowns", unknowns, n_unknowns)?;
             let knowns = array("knowns", knowns, n_knowns)?;
             let seed = array("seed", seed, n_seed)?;
-            c.instance.directional_derivative(unknowns, knowns, seed, array_mut("sensitivity", sensitivity, n_sensitivity)?)
+            c.instance.directional_derivative(
+                unknowns,
+                knowns,
+                seed,
+                array_mut("sensitivity", sensitivity, n_sensitivity)?,
+            )
         })
     }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Model>(instance: *mut c_void, reference: u32, n: *mut usize) -> Status {
+pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Model>(
+    instance: *mut c_void,
+    reference: u32,
+    n: *mut usize,
+) -> Status {
     // SAFETY: FMI pointers, checked for null.
     unsafe {
         call::<M>(instance, &phase::DEPENDENCIES, |c| {

@@ -181,8 +181,14 @@ pub enum Fault {
 
 fn method_name(number: i64) -> &'static str {
     use model::{Kind, Variables};
-    let Kind::Enumeration(methods) = <SolverMethod as Variables<f64>>::TABLE[0].kind else { return "" };
-    methods.items.iter().find(|i| i.value == number).map_or("unknown", |i| i.name)
+    let Kind::Enumeration(methods) = <SolverMethod as Variables<f64>>::TABLE[0].kind else {
+        return "";
+    };
+    methods
+        .items
+        .iter()
+        .find(|i| i.value == number)
+        .map_or("unknown", |i| i.name)
 }
 
 impl Fault {

@@ -49,7 +49,12 @@ impl<M: Model> Clone for State<M> {
         let (mut values, mut x) = (std::mem::take(&mut self.values), std::mem::take(&mut self.x));
         values.clone_from(&other.values);
         x.clone_from(&other.x);
-        *self = Self { values, x, model: other.model.clone(), ..*other };
+        *self = Self {
+            values,
+            x,
+            model: other.model.clone(),
+            ..*other
+        };
     }
 }
 
@@ -94,7 +99,12 @@ impl<M: Model> Instance<M> {
     pub fn new() -> Self {
         let table = Table::new::<M>();
         let state = State::new(&table);
-        Self { duals: vec![Dual64::from_re(0.0); table.variables.len()], table, state, warnings: Vec::new() }
+        Self {
+            duals: vec![Dual64::from_re(0.0); table.variables.len()],
+            table,
+            state,
+            warnings: Vec::new(),
+        }
     }
 
     /// Hash of the variable table.
@@ -133,7 +143,10 @@ impl<M: Model> Instance<M> {
         self.table
             .variables
             .get(reference as usize)
-            .ok_or(Fault::UnknownReference { reference, count: self.table.variables.len() })
+            .ok_or(Fault::UnknownReference {
+                reference,
+                count: self.table.variables.len(),
+            })
     }
 
     /// Read Float64 variables.
@@ -158,9 +171,12 @@ impl<M: Model> Instance<M> {
 
     fn wrong_type(&self, reference: u32, called: &'static str) -> Fault {
         match self.variable(reference) {
-            Ok(v) => {
-                Fault::WrongType { variable: v.name.clone(), reference, is: kind_name(v.entry.kind), called }
-            }
+            Ok(v) => Fault::WrongType {
+                variable: v.name.clone(),
+                reference,
+                is: kind_name(v.entry.kind),
+                called,
+            },
             Err(fault) => fault,
         }
     }
@@ -205,11 +221,20 @@ impl<M: Model> Instance<M> {
             }
             if let Some(reason) = self.not_settable(entry) {
                 let phase = format!("{:?}", self.state.phase);
-                return Err(Fault::NotSettable { variable: name.clone(), phase, reason });
+                return Err(Fault::NotSettable {
+                    variable: name.clone(),
+                    phase,
+                    reason,
+                });
             }
             if !in_range(entry, value(i)) {
                 let kept = self.state.values[*reference as usize];
-                return Err(Fault::Value { variable: name.clone(), value: value(i), kept, allowed: allowed(entry) });
+                return Err(Fault::Value {
+                    variable: name.clone(),
+                    value: value(i),
+                    kept,
+                    allowed: allowed(entry),
+                });
             }
         }
         for (i, reference) in references.iter().enumerate() {
@@ -247,12 +272,20 @@ impl<M: Model> Instance<M> {
     /// Times that make no sense.
     pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
         if !start.is_finite() {
-            return Err(Fault::Argument { argument: "startTime", value: start, allowed: "finite".into() });
+            return Err(Fault::Argument {
+                argument: "startTime",
+                value: start,
+                allowed: "finite".into(),
+            });
         }
         if let Some(stop) = stop
             && !(stop.is_finite() && stop > start)
         {
-            return Err(Fault::Argument { argument: "stopTime", value: stop, allowed: format!("> {start} s, finite") });
+            return Err(Fault::Argument {
+                argument: "stopTime",
+                value: stop,
+                allowed: format!("> {start} s, finite"),
+            });
         }
         self.state.start_time = start;
         self.state.stop_time = stop;
@@ -269,7 +302,10 @@ impl<M: Model> Instance<M> {
         let values = &self.state.values;
         let model = M::new(&M::Parameters::load(&values[Layout::<M>::PARAMETERS]))?;
         let given = &values[Layout::<M>::group(Group::Motion)];
-        let (x, discrete) = model.with_system(Start { t: self.state.start_time, given })?;
+        let (x, discrete) = model.with_system(Start {
+            t: self.state.start_time,
+            given,
+        })?;
         self.state.x = x;
         self.state.discrete = discrete;
         self.state.model = Some(model);
@@ -316,7 +352,14 @@ impl<M: Model> Instance<M> {
             return Ok(());
         }
         self.tuned()?;
-        let State { values, model, x, discrete, fresh, .. } = &mut self.state;
+        let State {
+            values,
+            model,
+            x,
+            discrete,
+            fresh,
+            ..
+        } = &mut self.state;
         let Some(model) = model else { return Ok(()) };
         let t = values[0];
         for group in Group::ALL {
@@ -330,11 +373,22 @@ impl<M: Model> Instance<M> {
             let outputs = &mut outputs[..range.len()];
             let u = &before[Layout::<M>::INPUTS];
             model
-                .with_system(Evaluate { group, t, x, u, d: discrete, values: outputs })
+                .with_system(Evaluate {
+                    group,
+                    t,
+                    x,
+                    u,
+                    d: discrete,
+                    values: outputs,
+                })
                 .map_err(|source| Fault::Evaluation { t, source })?;
             if let Some(i) = outputs.iter().position(|v| !v.is_finite()) {
                 let variable = self.table.variables[range.start + i].name.clone();
-                return Err(Fault::NotFinite { variable, value: outputs[i], t });
+                return Err(Fault::NotFinite {
+                    variable,
+                    value: outputs[i],
+                    t,
+                });
             }
             *fresh |= bit;
         }
@@ -347,7 +401,8 @@ impl<M: Model> Instance<M> {
     /// Arguments that make no sense; a step that cannot be done (then nothing has changed).
     pub fn do_step(&mut self, t: f64, step: f64) -> Result<(), Fault> {
         let now = self.state.values[0];
-        if !((t - now).abs() <= SAME_TIME * now.abs().max(1.0)) {
+        let same_time = (t - now).abs() <= SAME_TIME * now.abs().max(1.0);
+        if !same_time {
             return Err(Fault::Argument {
                 argument: "currentCommunicationPoint",
                 value: t,
@@ -356,7 +411,11 @@ impl<M: Model> Instance<M> {
         }
         let to = t + step;
         if !(step > 0.0 && to.is_finite() && to > now) {
-            return Err(Fault::Argument { argument: "communicationStepSize", value: step, allowed: "> 0 s, finite".into() });
+            return Err(Fault::Argument {
+                argument: "communicationStepSize",
+                value: step,
+                allowed: "> 0 s, finite".into(),
+            });
         }
         if let Some(stop) = self.state.stop_time
             && to > stop + SAME_TIME * stop.abs().max(1.0)
@@ -368,15 +427,37 @@ impl<M: Model> Instance<M> {
             });
         }
         self.tuned()?;
-        let State { values, model, x, discrete, solver, statistics, guarded, fresh, .. } = &mut self.state;
-        let (Some(model), Some(solver)) = (model, solver) else { return Ok(()) };
+        let State {
+            values,
+            model,
+            x,
+            discrete,
+            solver,
+            statistics,
+            guarded,
+            fresh,
+            ..
+        } = &mut self.state;
+        let (Some(model), Some(solver)) = (model, solver) else {
+            return Ok(());
+        };
         let h = solver.settings().inner_step(step);
         let fixed = !solver.settings().method.is_adaptive();
         let guard = fixed && (h - *guarded).abs() > SAME_STEP * h;
         let inputs = Layout::<M>::INPUTS;
         let u = &values[inputs.clone()];
         let duals = &mut self.duals[inputs];
-        model.with_system(Step { from: now, to, u, guard, duals, x, d: discrete, solver, statistics })?;
+        model.with_system(Step {
+            from: now,
+            to,
+            u,
+            guard,
+            duals,
+            x,
+            d: discrete,
+            solver,
+            statistics,
+        })?;
         *guarded = h;
         *fresh = 0;
         values[0] = to;
@@ -449,10 +530,20 @@ impl<M: Model> Instance<M> {
             needed |= self.table.access[*unknown as usize] & ALL_FRESH;
         }
         if let Some(s) = seed.iter().find(|s| !s.is_finite()) {
-            return Err(Fault::Argument { argument: "seed", value: *s, allowed: "finite".into() });
+            return Err(Fault::Argument {
+                argument: "seed",
+                value: *s,
+                allowed: "finite".into(),
+            });
         }
         self.tuned()?;
-        let State { values, model, x, discrete, .. } = &mut self.state;
+        let State {
+            values,
+            model,
+            x,
+            discrete,
+            ..
+        } = &mut self.state;
         let Some(model) = model else { return Ok(()) };
         let inputs = Layout::<M>::INPUTS;
         for i in inputs.clone() {
@@ -468,7 +559,14 @@ impl<M: Model> Instance<M> {
                 let (before, outputs) = self.duals.split_at_mut(range.start);
                 let (u, outputs) = (&before[inputs.clone()], &mut outputs[..range.len()]);
                 model
-                    .with_system(Evaluate { group, t, x, u, d: discrete, values: outputs })
+                    .with_system(Evaluate {
+                        group,
+                        t,
+                        x,
+                        u,
+                        d: discrete,
+                        values: outputs,
+                    })
                     .map_err(|source| Fault::Evaluation { t, source })?;
             }
         }
@@ -490,7 +588,11 @@ impl<M: Model> Instance<M> {
 
 /// Number of references and number of values must agree.
 pub(crate) fn same_length(references: usize, values: usize) -> Result<(), Fault> {
-    if references == values { Ok(()) } else { Err(Fault::Length { references, values }) }
+    if references == values {
+        Ok(())
+    } else {
+        Err(Fault::Length { references, values })
+    }
 }
 
 /// True if `value` may be set.

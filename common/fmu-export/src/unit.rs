@@ -44,7 +44,10 @@ impl BaseUnit {
 
     /// Attributes of the `BaseUnit` element: the exponents that are not zero.
     pub(crate) fn attributes(&self) -> impl Iterator<Item = (&'static str, String)> {
-        BASE.into_iter().zip(self.exponents).filter(|(_, e)| *e != 0).map(|(name, e)| (name, e.to_string()))
+        BASE.into_iter()
+            .zip(self.exponents)
+            .filter(|(_, e)| *e != 0)
+            .map(|(name, e)| (name, e.to_string()))
     }
 }
 
@@ -69,7 +72,8 @@ mod tests {
 
     #[test]
     fn products_and_quotients_become_base_exponents() {
-        let pairs = |p: &[(&'static str, i32)]| p.iter().map(|(n, e)| (*n, e.to_string())).collect::<Vec<_>>();
+        let pairs =
+            |p: &[(&'static str, i32)]| p.iter().map(|(n, e)| (*n, e.to_string())).collect::<Vec<_>>();
         assert_eq!(exponents("N.s/m"), pairs(&[("kg", 1), ("s", -1)]));
         assert_eq!(exponents("kg.m2"), pairs(&[("kg", 1), ("m", 2)]));
         assert_eq!(exponents("rad/s"), pairs(&[("s", -1), ("rad", 1)]));

@@ -8,8 +8,8 @@ pub(crate) const DEGREE: usize = 4;
 /// ```text
 /// x(t + theta h) = x_0 + theta (c_1 + theta (c_2 + theta (c_3 + theta c_4))),   0 <= theta <= 1
 /// ```
-/// Its local error is `O(h^3)` for Heun, `O(h^4)` for RK4 and `O(h^5)` for Dopri5, so that values read from it keep the
-/// order of the method. `theta = 1` is the method's new state before any projection.
+/// Its local error is `O(h^3)` for Heun, `O(h^4)` for RK4 and `O(h^5)` for Dopri5, so that values read from it
+/// keep the order of the method. `theta = 1` is the method's new state before any projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dense<const N: usize> {
     /// Start of the step [s]

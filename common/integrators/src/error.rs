@@ -44,9 +44,7 @@ pub enum StepError<E> {
         value: f64,
     },
     /// The step size of an adaptive method fell to the resolution of time.
-    #[error(
-        "step size fell to {h:.3e} s at t = {t:.6} s (below {min:.0e}); stiffest state: {index}"
-    )]
+    #[error("step size fell to {h:.3e} s at t = {t:.6} s (below {min:.0e}); stiffest state: {index}")]
     StepTooSmall {
         /// Start of the step [s].
         t: f64,

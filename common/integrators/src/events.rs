@@ -12,9 +12,9 @@ use crate::{Dense, StepError};
 /// Functions of time and state whose zero crossings are events.
 ///
 /// What counts, for an indicator `g`:
-/// 1. At the start of a call `g` is on a side, above or below zero, or within its [band](Self::band) around zero. In the
-///    band it has no side yet: it takes the first side on which it is seen outside the band, and this is no event. An
-///    indicator that starts at zero counts only when it has left and comes back.
+/// 1. At the start of a call `g` is on a side, above or below zero, or within its [band](Self::band) around zero.
+///    In the band it has no side yet: it takes the first side on which it is seen outside the band, and this is no
+///    event. An indicator that starts at zero counts only when it has left and comes back.
 /// 2. `g` beyond zero, on the other side, is an event. Touching zero is none.
 /// 3. When a call returns, at its end or at an event, every indicator that had a side and now is beyond zero *or within
 ///    its band* is reported. So nothing is lost that the next call would take for a start at zero (1), simultaneous
@@ -28,8 +28,8 @@ pub trait Indicators<const N: usize, const M: usize> {
 
     /// How near to zero counts as zero at the start and end of a call.
     ///
-    /// Above what the resolution of time, `4 eps |t|`, makes of the indicator's rate, else an event whose map turns the
-    /// motion around comes twice; below the accuracy wanted for events at the end of a call.
+    /// Above what the resolution of time, `4 eps |t|`, makes of the indicator's rate, else an event whose map
+    /// turns the motion around comes twice; below the accuracy wanted for events at the end of a call.
     fn band(&self) -> [f64; M] {
         [1e-10; M]
     }
@@ -110,7 +110,8 @@ impl<'a, E, const M: usize> Monitor<'a, E, M> {
         }
     }
 
-    /// Distance to the first crossing: the smallest indicator, each positive on its own side; negative after a crossing.
+    /// Distance to the first crossing: the smallest indicator, each positive on its own side; negative after a
+    /// crossing.
     fn margin(&self, g: &[f64; M]) -> f64 {
         self.sides
             .iter()
@@ -179,10 +180,7 @@ impl<'a, E, const M: usize> Monitor<'a, E, M> {
 }
 
 /// Goes out from `guess` until `f(a) >= 0 > f(b)`, not beyond `limits`.
-#[allow(
-    clippy::type_complexity,
-    reason = "a bracket and the values at its ends"
-)]
+#[allow(clippy::type_complexity, reason = "a bracket and the values at its ends")]
 fn surround<F>(
     mut f: impl FnMut(f64) -> Result<f64, F>,
     guess: f64,

@@ -64,9 +64,7 @@ impl<const N: usize, const S: usize> OneStep<N> for Tableau<S> {
             x = combine(&from.x, h, &self.a[i][..i], &k[..i]);
             let t = from.t + self.c[i] * h;
             *evaluations += 1;
-            k[i] = ode
-                .rhs(t, &x)
-                .map_err(|source| StepError::Rhs { t, source })?;
+            k[i] = ode.rhs(t, &x).map_err(|source| StepError::Rhs { t, source })?;
         }
         if !self.first_same_as_last {
             x = combine(&from.x, h, &self.b, &k);
@@ -135,12 +133,8 @@ mod tests {
     /// The same inside the step: `sum b_i(theta) c_i^q = theta^(q+1)/(q+1)` for q < order of the extension, and
     /// `b_i(1) = b_i`.
     fn extension_integrates_powers_of_time<const S: usize>(m: &Tableau<S>, order: i32) {
-        let weight = |i: usize, theta: f64| -> f64 {
-            m.dense[i]
-                .iter()
-                .rev()
-                .fold(0.0, |sum, d| (sum + d) * theta)
-        };
+        let weight =
+            |i: usize, theta: f64| -> f64 { m.dense[i].iter().rev().fold(0.0, |sum, d| (sum + d) * theta) };
         for i in 0..S {
             assert!((weight(i, 1.0) - m.b[i]).abs() < ROUNDING);
         }

@@ -48,11 +48,7 @@ pub(crate) fn fixed<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
             },
         };
         let trial = method.step(ode, &from, h, &mut run.statistics.rhs_evaluations)?;
-        let t = if i == n {
-            t_end
-        } else {
-            t_start + f64::from(i) * h
-        };
+        let t = if i == n { t_end } else { t_start + f64::from(i) * h };
         all_finite(t, M::state(&trial))?;
         if W::WATCHES {
             let taken = Taken {

@@ -8,8 +8,8 @@
 //! beside `explicit.rs`. Nothing here knows a model or FMI, and nothing allocates.
 //!
 //! Sources: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. 1993
-//! (methods, step size control, dense output); I. F. D. Oliveira, R. H. C. Takahashi, ACM TOMS 47 (2020) (root finder).
-//! Left out: integration backwards in time, implicit and multistep methods.
+//! (methods, step size control, dense output); I. F. D. Oliveira, R. H. C. Takahashi, ACM TOMS 47 (2020) (root
+//! finder). Left out: integration backwards in time, implicit and multistep methods.
 //!
 //! ```
 //! use integrators::{Method, Ode, Settings, Solver, Statistics};
@@ -31,6 +31,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![forbid(unsafe_code)]
+#![allow(rustdoc::broken_intra_doc_links, reason = "units stand in brackets")]
 
 mod adaptive;
 mod dense;

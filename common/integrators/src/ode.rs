@@ -8,13 +8,14 @@ pub trait Ode<const N: usize> {
     /// `f(t, x)`: a pure function of its arguments and of what `self` holds.
     ///
     /// # Errors
-    /// Where the model has no value. An adaptive method takes an error inside a trial step as a step too long and shrinks it;
-    /// at the start of a step, and in fixed steps, the error is returned.
+    /// Where the model has no value. An adaptive method takes an error inside a trial step as a step too long and
+    /// shrinks it; at the start of a step, and in fixed steps, the error is returned.
     fn rhs(&self, t: f64, x: &[f64; N]) -> Result<[f64; N], Self::Error>;
 
     /// Brings a new state back on its manifold (closed loop, unit quaternion); called once after every accepted step.
     ///
-    /// The result says whether `x` was changed: then the last slope of the step is not reused as the first one of the next.
+    /// The result says whether `x` was changed: then the last slope of the step is not reused as the first one of
+    /// the next.
     ///
     /// # Errors
     /// When the projection does not converge; the call then fails as a whole.

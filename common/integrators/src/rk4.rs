@@ -8,8 +8,8 @@
 //! ----+--------------------
 //!     | 1/6  1/3  1/3  1/6
 //! ```
-//! Source: W. Kutta, Z. Math. Phys. 46 (1901); extension: M. Zennaro, Math. Comp. 46 (1986), the natural one. It has the
-//! order of a cubic Hermite polynomial (3, local error `O(h^4)`) and needs no slope at the new state.
+//! Source: W. Kutta, Z. Math. Phys. 46 (1901); extension: M. Zennaro, Math. Comp. 46 (1986), the natural one. It
+//! has the order of a cubic Hermite polynomial (3, local error `O(h^4)`) and needs no slope at the new state.
 
 use crate::explicit::Tableau;
 

@@ -72,10 +72,7 @@ mod tests {
         for (f, a, b, root) in cases {
             let ([lo, hi], evaluations) = run(f, a, b, 1e-14);
             let rounding = 4.0 * f64::EPSILON;
-            assert!(
-                lo - rounding <= root && root <= hi + rounding,
-                "{lo} {root} {hi}"
-            );
+            assert!(lo - rounding <= root && root <= hi + rounding, "{lo} {root} {hi}");
             assert!(hi - lo <= 1e-14 && f(lo) >= 0.0 && f(hi) < 0.0);
             // bisection halves 2 to 1e-14 in 48
             assert!(evaluations <= 49, "{evaluations}");

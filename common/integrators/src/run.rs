@@ -61,8 +61,7 @@ impl<const N: usize> Run<N> {
             let trial = method.step(ode, from, theta * h, &mut self.statistics.rhs_evaluations)?;
             Ok(*M::state(&trial))
         };
-        let Some(Stop { theta, x }) =
-            watch.inspect(&method.dense(from, trial, h), taken.last, restep)?
+        let Some(Stop { theta, x }) = watch.inspect(&method.dense(from, trial, h), taken.last, restep)?
         else {
             return Ok(false);
         };

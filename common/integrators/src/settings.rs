@@ -32,11 +32,7 @@ impl Settings {
     }
 
     pub(crate) fn check(self) -> Result<Self, SettingsError> {
-        for (name, value) in [
-            ("step", self.step),
-            ("rtol", self.rtol),
-            ("atol", self.atol),
-        ] {
+        for (name, value) in [("step", self.step), ("rtol", self.rtol), ("atol", self.atol)] {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(SettingsError { name, value });
             }

@@ -72,8 +72,8 @@ impl Solver {
 
     /// Integrates `x` from `t` to exactly `t_end`.
     ///
-    /// A fixed-step method takes `n = max(1, ceil(H/step - 1e-9))` equal steps of `H = t_end - t`; an adaptive one chooses
-    /// its steps and cuts the last two so that no tiny rest is left.
+    /// A fixed-step method takes `n = max(1, ceil(H/step - 1e-9))` equal steps of `H = t_end - t`; an adaptive
+    /// one chooses its steps and cuts the last two so that no tiny rest is left.
     ///
     /// # Errors
     /// See [`StepError`]. Then `x`, the statistics and the solver's memory are as before the call.
@@ -109,8 +109,8 @@ impl Solver {
 
     /// As [`advance`](Self::advance), but stops just after the first zero crossing of any indicator.
     ///
-    /// What counts as a crossing, also at the very start and end, is said at [`Indicators`]. After an event that changes
-    /// the state, call [`reset`](Self::reset).
+    /// What counts as a crossing, also at the very start and end, is said at [`Indicators`]. After an event that
+    /// changes the state, call [`reset`](Self::reset).
     ///
     /// # Errors
     /// As [`advance`](Self::advance), and an indicator that is not finite.
@@ -156,15 +156,7 @@ impl Solver {
         match self.settings.method {
             Method::Heun => fixed(&HEUN, step, ode, &mut run, t_end, watch)?,
             Method::Rk4 => fixed(&RK4, step, ode, &mut run, t_end, watch)?,
-            Method::Dopri5 => adaptive(
-                &DOPRI5,
-                &self.settings,
-                &mut memory,
-                ode,
-                &mut run,
-                t_end,
-                watch,
-            )?,
+            Method::Dopri5 => adaptive(&DOPRI5, &self.settings, &mut memory, ode, &mut run, t_end, watch)?,
         }
         *x = run.x;
         *statistics = run.statistics;

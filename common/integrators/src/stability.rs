@@ -95,7 +95,8 @@ pub fn violates(method: Method, h: f64, lambda: Complex) -> bool {
 
 /// Largest step `h` so that no step up to `h` lets a mode grow by more than [`MAX_AMPLIFICATION`].
 ///
-/// Infinite when no eigenvalue limits it (all are 0, or the method allows any step), 0 when an eigenvalue is not finite.
+/// Infinite when no eigenvalue limits it (all are 0, or the method allows any step), 0 when an eigenvalue is not
+/// finite.
 #[must_use]
 pub fn largest_stable_step(method: Method, eigenvalues: &[Complex]) -> f64 {
     eigenvalues
@@ -105,8 +106,8 @@ pub fn largest_stable_step(method: Method, eigenvalues: &[Complex]) -> f64 {
 }
 
 fn largest_for(method: Method, lambda: Complex) -> f64 {
-    /// Resolution and end of the search along the ray, as `|h lambda|`; explicit methods end below 2 S, and where a method
-    /// with an unbounded region does not grow up to the end it is taken as free.
+    /// Resolution and end of the search along the ray, as `|h lambda|`; explicit methods end below 2 S, and where
+    /// a method with an unbounded region does not grow up to the end it is taken as free.
     const FINE: f64 = 1.0 / 256.0;
     const END: f64 = 100.0;
 
@@ -128,9 +129,9 @@ fn largest_for(method: Method, lambda: Complex) -> f64 {
                 return inside / size;
             }
             if stable(middle) {
-                inside = middle
+                inside = middle;
             } else {
-                outside = middle
+                outside = middle;
             }
         }
     }

@@ -173,7 +173,7 @@ fn last_steps_are_balanced() {
         let (mut x, mut statistics, mut steps) = ([1.0, 0.0], Statistics::default(), Vec::new());
         solver(Method::Dopri5, 1.0, 1e-6)
             .advance_dense(&ode, 0.0, t_end, &mut x, &mut statistics, |step| {
-                steps.push(step.h)
+                steps.push(step.h);
             })
             .expect("linear");
         let [.., one, other] = steps[..] else {
@@ -198,14 +198,8 @@ fn event_location_is_counted() {
     for method in Method::ALL {
         let ode = Rotation::default();
         let (mut x, mut statistics) = ([1.0, 0.0], Statistics::default());
-        let reached = solver(method, 0.1, 1e-9).advance_until(
-            &ode,
-            &Height,
-            0.0,
-            3.0,
-            &mut x,
-            &mut statistics,
-        );
+        let reached =
+            solver(method, 0.1, 1e-9).advance_until(&ode, &Height, 0.0, 3.0, &mut x, &mut statistics);
         assert!(matches!(
             reached,
             Ok(Reached::Event {

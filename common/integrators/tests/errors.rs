@@ -4,8 +4,7 @@ mod common;
 
 use common::{Linear, solver};
 use integrators::{
-    Indicators, MAX_STEPS, Memory, Method, Ode, Settings, SettingsError, Solver, Statistics,
-    StepError,
+    Indicators, MAX_STEPS, Memory, Method, Ode, Settings, SettingsError, Solver, Statistics, StepError,
 };
 
 /// Where the model has no value.
@@ -89,8 +88,7 @@ fn settings_must_be_finite_and_positive() {
             (Settings { rtol: bad, ..good }, "rtol"),
             (Settings { atol: bad, ..good }, "atol"),
         ] {
-            let SettingsError { name: found, value } =
-                Solver::new(settings).expect_err("must be refused");
+            let SettingsError { name: found, value } = Solver::new(settings).expect_err("must be refused");
             assert_eq!((found, value.to_bits()), (name, bad.to_bits()));
         }
     }
@@ -104,12 +102,7 @@ fn settings_must_be_finite_and_positive() {
 #[test]
 fn interval_must_go_forward() {
     for method in Method::ALL {
-        for [t, t_end] in [
-            [1.0, 0.5],
-            [f64::NAN, 1.0],
-            [0.0, f64::NAN],
-            [0.0, f64::INFINITY],
-        ] {
+        for [t, t_end] in [[1.0, 0.5], [f64::NAN, 1.0], [0.0, f64::NAN], [0.0, f64::INFINITY]] {
             let error = failure(
                 &mut solver(method, 0.1, 1e-6),
                 &Linear::OSCILLATOR,
@@ -124,12 +117,7 @@ fn interval_must_go_forward() {
 /// Fixed steps return the error of the right-hand side with the time of the stage.
 #[test]
 fn fixed_steps_return_the_error_of_the_model() {
-    let error = failure(
-        &mut solver(Method::Heun, 0.25, 1.0),
-        &Strut,
-        [0.0, 2.0],
-        [0.5],
-    );
+    let error = failure(&mut solver(Method::Heun, 0.25, 1.0), &Strut, [0.0, 2.0], [0.5]);
     assert_eq!(
         error,
         StepError::Rhs {
@@ -140,7 +128,8 @@ fn fixed_steps_return_the_error_of_the_model() {
     assert_eq!(error.to_string(), "at t = 0.500000 s: strut of length 0 m");
 }
 
-/// An adaptive method shrinks its step at such an error: it comes as near as time allows, and then says what the model says.
+/// An adaptive method shrinks its step at such an error: it comes as near as time allows, and then says what the
+/// model says.
 #[test]
 fn adaptive_steps_shrink_at_an_error_of_the_model() {
     let mut solver = solver(Method::Dopri5, 1.0, 1e-6);
@@ -185,12 +174,7 @@ fn an_error_at_the_start_is_returned_at_once() {
 #[test]
 fn fixed_steps_name_the_state_that_is_not_finite() {
     for method in [Method::Heun, Method::Rk4] {
-        let error = failure(
-            &mut solver(method, 0.01, 1.0),
-            &BlowUp,
-            [0.0, 2.0],
-            [1.0, 1.0],
-        );
+        let error = failure(&mut solver(method, 0.01, 1.0), &BlowUp, [0.0, 2.0], [1.0, 1.0]);
         let StepError::NotFinite { t, index: 1, value } = error else {
             panic!("{error:?}")
         };
@@ -207,13 +191,7 @@ fn adaptive_steps_stop_before_a_pole() {
         [0.0, 2.0],
         [1.0, 1.0],
     );
-    let StepError::StepTooSmall {
-        t,
-        h,
-        min,
-        index: 1,
-    } = error
-    else {
+    let StepError::StepTooSmall { t, h, min, index: 1 } = error else {
         panic!("{error:?}")
     };
     assert!((t - 1.0).abs() < 1e-5 && h < min, "{error:?}"); // the pole moves with the tolerance
@@ -222,33 +200,18 @@ fn adaptive_steps_stop_before_a_pole() {
 
 #[test]
 fn a_slope_that_is_not_a_number_is_never_passed_on() {
-    let error = failure(
-        &mut solver(Method::Rk4, 0.25, 1.0),
-        &Hole,
-        [0.0, 2.0],
-        [0.0],
-    );
+    let error = failure(&mut solver(Method::Rk4, 0.25, 1.0), &Hole, [0.0, 2.0], [0.0]);
     assert!(
         matches!(error, StepError::NotFinite { t, index: 0, .. } if (t - 1.0).abs() < 1e-15),
         "{error:?}"
     );
-    let error = failure(
-        &mut solver(Method::Dopri5, 1.0, 1e-6),
-        &Hole,
-        [0.0, 2.0],
-        [0.0],
-    );
+    let error = failure(&mut solver(Method::Dopri5, 1.0, 1e-6), &Hole, [0.0, 2.0], [0.0]);
     assert!(
         matches!(error, StepError::NotFinite { t, index: 0, .. } if (t - 1.0).abs() < 1e-14),
         "{error:?}"
     );
     // at the start of a step
-    let error = failure(
-        &mut solver(Method::Dopri5, 1.0, 1e-6),
-        &Hole,
-        [1.0, 2.0],
-        [0.0],
-    );
+    let error = failure(&mut solver(Method::Dopri5, 1.0, 1e-6), &Hole, [1.0, 2.0], [0.0]);
     assert!(
         matches!(error, StepError::NotFinite { t, index: 0, .. } if (t - 1.0).abs() < 1e-15),
         "{error:?}"
@@ -274,9 +237,7 @@ fn too_many_steps_are_refused_before_the_first() {
     );
     assert_eq!(
         error.to_string(),
-        format!(
-            "more than {MAX_STEPS} steps of 1.000e-300 s needed from t = 0.000000 s to 1.000000 s"
-        )
+        format!("more than {MAX_STEPS} steps of 1.000e-300 s needed from t = 0.000000 s to 1.000000 s")
     );
 }
 
@@ -294,14 +255,7 @@ fn an_indicator_that_is_not_a_number_is_refused() {
     for method in Method::ALL {
         let mut solver = solver(method, 0.1, 1e-6);
         let before = solver;
-        let error = solver.advance_until(
-            &Linear::OSCILLATOR,
-            &Undefined,
-            0.0,
-            1.0,
-            &mut x,
-            &mut statistics,
-        );
+        let error = solver.advance_until(&Linear::OSCILLATOR, &Undefined, 0.0, 1.0, &mut x, &mut statistics);
         assert!(
             matches!(error, Err(StepError::IndicatorNotFinite { index: 1, .. })),
             "{error:?}"
@@ -331,12 +285,7 @@ impl Ode<1> for Projected {
 fn a_failing_projection_fails_the_call() {
     for method in Method::ALL {
         let mut solver = solver(method, 1.0, 1e-6);
-        let error = failure(
-            &mut solver,
-            &Projected(Err(NoStrut(0.0))),
-            [0.0, 1.0],
-            [0.0],
-        );
+        let error = failure(&mut solver, &Projected(Err(NoStrut(0.0))), [0.0, 1.0], [0.0]);
         assert!(matches!(
             error,
             StepError::Rhs {
@@ -344,12 +293,7 @@ fn a_failing_projection_fails_the_call() {
                 ..
             }
         ));
-        let error = failure(
-            &mut solver,
-            &Projected(Ok(f64::INFINITY)),
-            [0.0, 1.0],
-            [0.0],
-        );
+        let error = failure(&mut solver, &Projected(Ok(f64::INFINITY)), [0.0, 1.0], [0.0]);
         assert!(matches!(error, StepError::NotFinite { index: 0, .. }));
     }
 }

@@ -24,12 +24,7 @@ fn earliest_event_wins() {
         assert!((t - 0.31).abs() < 1e-14);
         assert_eq!(
             which,
-            [
-                Crossing::None,
-                Crossing::None,
-                Crossing::Falling,
-                Crossing::None
-            ]
+            [Crossing::None, Crossing::None, Crossing::Falling, Crossing::None]
         );
     }
 }
@@ -37,8 +32,7 @@ fn earliest_event_wins() {
 /// Indicators that cross together are reported together, however differently they are scaled.
 #[test]
 fn simultaneous_events_come_together() {
-    let events =
-        When(|t: f64, x: &[f64; 1]| [x[0] - 0.7, 1e3 * (0.7 - t), (x[0] - 0.7).powi(3), 0.701 - t]);
+    let events = When(|t: f64, x: &[f64; 1]| [x[0] - 0.7, 1e3 * (0.7 - t), (x[0] - 0.7).powi(3), 0.701 - t]);
     for method in Method::ALL {
         let mut x = [0.0];
         let mut solver = solver(method, 0.1, 1e-6);
@@ -58,12 +52,7 @@ fn simultaneous_events_come_together() {
         assert!((t - 0.701).abs() < 1e-14);
         assert_eq!(
             which,
-            [
-                Crossing::None,
-                Crossing::None,
-                Crossing::None,
-                Crossing::Falling
-            ]
+            [Crossing::None, Crossing::None, Crossing::None, Crossing::Falling]
         );
     }
 }
@@ -214,10 +203,7 @@ fn indicators_do_not_disturb_the_run() {
             Ok(Reached::End)
         );
         assert_eq!(other.advance(&orbit, 0.0, 7.0, &mut y, &mut r), Ok(()));
-        assert_eq!(
-            (x.map(f64::to_bits), s, one),
-            (y.map(f64::to_bits), r, other)
-        );
+        assert_eq!((x.map(f64::to_bits), s, one), (y.map(f64::to_bits), r, other));
     }
 }
 
@@ -252,8 +238,5 @@ fn projection_across_zero_is_seen() {
     let (t, which) = event(until(&mut solver, &Circle, &outside, [0.0, 2.0], &mut x));
     assert!(t > 0.0 && t < 0.5);
     assert_eq!(which, [Crossing::Falling]);
-    assert!(
-        (x[0].hypot(x[1]) - 1.0).abs() < 1e-15,
-        "projected at the event"
-    );
+    assert!((x[0].hypot(x[1]) - 1.0).abs() < 1e-15, "projected at the event");
 }

@@ -33,11 +33,7 @@ fn projectile_lands_on_time() {
                     t - start - landing
                 );
                 assert_eq!(which, [Crossing::Falling]);
-                assert!(
-                    x[0] <= 0.0 && x[0] > -1e-10,
-                    "just below the ground: {:e}",
-                    x[0]
-                );
+                assert!(x[0] <= 0.0 && x[0] > -1e-10, "just below the ground: {:e}", x[0]);
             }
         }
     }
@@ -96,10 +92,7 @@ fn quarter_period_errors(method: Method, steps: u32) -> [f64; 4] {
 #[test]
 fn events_have_the_order_of_the_method() {
     for (method, steps) in [(Method::Heun, 40), (Method::Rk4, 20), (Method::Dopri5, 20)] {
-        assert_order(
-            &quarter_period_errors(method, steps),
-            f64::from(method.order()),
-        );
+        assert_order(&quarter_period_errors(method, steps), f64::from(method.order()));
     }
 }
 

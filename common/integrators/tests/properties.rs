@@ -14,6 +14,10 @@ fn advance(solver: &mut Solver, ode: &Linear, t: f64, t_end: f64, x: &mut [f64; 
     statistics
 }
 
+fn state() -> impl Strategy<Value = [f64; 2]> {
+    prop::array::uniform2(-1.0..1.0)
+}
+
 fn linear() -> impl Strategy<Value = Linear> {
     prop::array::uniform2(prop::array::uniform2(-3.0..3.0)).prop_map(|a| Linear { a })
 }
@@ -22,7 +26,7 @@ proptest! {
     /// Calls that end on the steps of one call give the same, bit by bit (steps and times are binary fractions).
     #[test]
     fn split_calls_equal_one_call(
-        ode in linear(), x in prop::array::uniform2(-1.0..1.0), first in 1..200_u32, second in 1..200_u32, power in 4..10_i32,
+        ode in linear(), x in state(), first in 1..200_u32, second in 1..200_u32, power in 4..10_i32,
     ) {
         for method in [Method::Heun, Method::Rk4] {
             let h = f64::from(-power).exp2();
@@ -40,7 +44,7 @@ proptest! {
 
     /// The same with any step: equal up to the rounding of the step size.
     #[test]
-    fn split_calls_equal_one_call_up_to_rounding(ode in linear(), h in 1e-3..0.05, first in 1..50_u32, second in 1..50_u32) {
+    fn split_calls_agree_up_to_rounding(ode in linear(), h in 1e-3..0.05, first in 1..50_u32, second in 1..50_u32) {
         for method in [Method::Heun, Method::Rk4] {
             let mut solver = solver(method, h, 1.0);
             let [middle, end] = [f64::from(first) * h, f64::from(first + second) * h];
@@ -57,7 +61,7 @@ proptest! {
 
     /// Fixed steps against the closed form of the matrix exponential: `n` local errors of size `(|A| h)^(p+1)`.
     #[test]
-    fn linear_systems_follow_the_matrix_exponential(ode in linear(), x in prop::array::uniform2(-1.0..1.0)) {
+    fn linear_systems_follow_the_matrix_exponential(ode in linear(), x in state()) {
         let norm = ode.a.as_flattened().iter().map(|a| a * a).sum::<f64>().sqrt();
         let exact = ode.exact(1.0, &x);
         for (method, factorial) in [(Method::Heun, 6.0), (Method::Rk4, 120.0)] {
@@ -73,7 +77,7 @@ proptest! {
 
     /// The adaptive method keeps its tolerance, up to the growth of the system and the number of steps.
     #[test]
-    fn adaptive_steps_follow_the_matrix_exponential(ode in linear(), x in prop::array::uniform2(-1.0..1.0), digits in 4..11_i32) {
+    fn adaptive_steps_follow_the_matrix_exponential(ode in linear(), x in state(), digits in 4..11_i32) {
         let tolerance = 0.1_f64.powi(digits);
         let norm = ode.a.as_flattened().iter().map(|a| a * a).sum::<f64>().sqrt();
         let mut end = x;
@@ -87,7 +91,7 @@ proptest! {
 
     /// A mode that the guard lets pass does not grow by more than it says, for any state.
     #[test]
-    fn growth_per_step_is_the_stability_function(s in -4.0..1.0, w in 0.1..4.0, h in 0.01..1.0, x in prop::array::uniform2(-1.0..1.0)) {
+    fn growth_per_step_is_the_stability_function(s in -4.0..1.0, w in 0.1..4.0, h in 0.01..1.0, x in state()) {
         let ode = Linear { a: [[s, w], [-w, s]] }; // eigenvalues s +- i w, normal: lengths grow by |R| exactly
         for method in [Method::Heun, Method::Rk4] {
             let mut end = x;

@@ -49,8 +49,8 @@ fn oscillator_grows_by_the_stability_function() {
     }
 }
 
-/// Ends of the stability region on the real and imaginary axis with the bound 1; here with 1.1 they lie further out, where
-/// `|R| = 1.1` exactly.
+/// Ends of the stability region on the real and imaginary axis with the bound 1; here with 1.1 they lie further
+/// out, where `|R| = 1.1` exactly.
 #[test]
 fn largest_step_is_where_growth_reaches_the_bound() {
     let lambdas = [
@@ -121,9 +121,7 @@ fn eigenvalues_that_are_not_finite_allow_no_step() {
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             assert!(violates(method, 0.1, Complex::new(bad, 0.0)));
             assert!(violates(method, 0.1, Complex::new(0.0, bad)));
-            assert!(
-                largest_stable_step(method, &[Complex::new(bad, 1.0)]).abs() < f64::MIN_POSITIVE
-            );
+            assert!(largest_stable_step(method, &[Complex::new(bad, 1.0)]).abs() < f64::MIN_POSITIVE);
         }
         // overflow inside the polynomial counts as growth
         assert!(violates(method, 1e200, Complex::new(-1e200, 1e200)));

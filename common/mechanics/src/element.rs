@@ -103,6 +103,18 @@ pub struct Tip<S, const D: usize, const N: usize> {
     pub Rq: Matrix<S, N, D>,
 }
 
+/// By Cholesky's factors; a single degree of freedom needs neither root nor factor.
+#[inline]
+fn inverse_positive_definite<S: Scalar, const N: usize>(
+    Mq: &Matrix<S, N, N>,
+) -> Result<Matrix<S, N, N>, NotPositiveDefinite> {
+    if N == 1 {
+        let positive = Mq[0].re() > 0.0;
+        return positive.then(|| Mq.map(S::recip)).ok_or(NotPositiveDefinite);
+    }
+    Ok(Mq.cholesky().ok_or(NotPositiveDefinite)?.inverse())
+}
+
 impl<S: Scalar, const D: usize, const N: usize> Hinged<S, D, N> {
     /// The element `body` with known `loads` at body points (12a), (12b); `None`: not there.
     ///
@@ -131,12 +143,19 @@ impl<S: Scalar, const D: usize, const N: usize> Hinged<S, D, N> {
             Q0 += p.J.transpose() * F;
             f += F;
         }
-        let inverse = Mq.cholesky().ok_or(NotPositiveDefinite)?.inverse();
+        let inverse = inverse_positive_definite(&Mq)?;
         let Kq = inverse * K;
         let q0 = inverse * Q0; // (6) at a_A = 0
         M -= K.transpose() * Kq; // (12b)
         f -= K.transpose() * q0;
-        Ok(Self { M, f, q0, Kq, K, inverse })
+        Ok(Self {
+            M,
+            f,
+            q0,
+            Kq,
+            K,
+            inverse,
+        })
     }
 
     /// The two-port columns of the tip `p` (12c).

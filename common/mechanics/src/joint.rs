@@ -85,7 +85,12 @@ impl<S: Scalar> Pose<S, 2, 1> for PlanarPose<S> {
         let Self { sin, cos, theta_dot } = *self;
         let r = Vector2::new(cos * p.x - sin * p.y, sin * p.x + cos * p.y);
         let n = Vector2::new(-r.y, r.x);
-        Point { r, v: n * theta_dot, J: n, c: -r * (theta_dot * theta_dot) }
+        Point {
+            r,
+            v: n * theta_dot,
+            J: n,
+            c: -r * (theta_dot * theta_dot),
+        }
     }
     #[inline]
     fn body(&self, rigid: &Rigid<2>) -> Body<S, 2, 1> {
@@ -127,7 +132,11 @@ impl Joint<2, 1> for Planar {
     #[inline]
     fn pose<S: Scalar>(&self, x: &[S]) -> PlanarPose<S> {
         let (sin, cos) = x[0].sin_cos();
-        PlanarPose { sin, cos, theta_dot: x[1] }
+        PlanarPose {
+            sin,
+            cos,
+            theta_dot: x[1],
+        }
     }
     angle_coordinates!(1);
 }
@@ -155,7 +164,12 @@ impl<S: Scalar, const N: usize> Pose<S, 3, N> for SpatialPose<S, N> {
             column.copy_from(&axis.cross(&r));
         }
         let v = omega.cross(&r);
-        Point { r, v, J, c: gamma.cross(&r) + omega.cross(&v) }
+        Point {
+            r,
+            v,
+            J,
+            c: gamma.cross(&r) + omega.cross(&v),
+        }
     }
     #[inline]
     fn body(&self, rigid: &Rigid<3>) -> Body<S, 3, N> {
@@ -201,7 +215,12 @@ impl Joint<3, 1> for Revolute {
     fn pose<S: Scalar>(&self, x: &[S]) -> SpatialPose<S, 1> {
         let (theta, theta_dot) = (x[0], x[1]);
         let (R, axis, _) = link_frame(S::lift(self.phi), theta);
-        SpatialPose { R, H: axis, gamma: Vector3::zeros(), omega: axis * theta_dot }
+        SpatialPose {
+            R,
+            H: axis,
+            gamma: Vector3::zeros(),
+            omega: axis * theta_dot,
+        }
     }
     angle_coordinates!(1);
 }
@@ -236,7 +255,12 @@ pub struct Spherical;
 fn quaternion_rate<S: Scalar>(p: &[S], omega: &[S]) -> [S; 4] {
     let (w, x, y, z) = (p[0], p[1], p[2], p[3]);
     let (a, b, c) = (omega[0] * 0.5, omega[1] * 0.5, omega[2] * 0.5);
-    [-a * x - b * y - c * z, a * w + b * z - c * y, b * w + c * x - a * z, c * w + a * y - b * x]
+    [
+        -a * x - b * y - c * z,
+        a * w + b * z - c * y,
+        b * w + c * x - a * z,
+        c * w + a * y - b * x,
+    ]
 }
 
 impl Joint<3, 3> for Spherical {
@@ -296,12 +320,20 @@ mod tests {
     use proptest::prelude::*;
 
     fn rigid() -> Rigid<3> {
-        Rigid { m: 2.0, c: Vector3::new(0.1, -0.2, 0.3), I_c: Matrix3::new(1.2, 0.1, 0.0, 0.1, 0.8, -0.2, 0.0, -0.2, 0.9) }
+        Rigid {
+            m: 2.0,
+            c: Vector3::new(0.1, -0.2, 0.3),
+            I_c: Matrix3::new(1.2, 0.1, 0.0, 0.1, 0.8, -0.2, 0.0, -0.2, 0.9),
+        }
     }
 
     /// Points move as dual numbers say: v and the acceleration J q'' + c are the first and second
     /// derivative of r along x(t), whatever the joint kind.
-    fn kinematics_agree<const N: usize, J: Joint<3, N>>(joint: J, x: &[f64], q_ddot: [f64; 3]) -> Result<(), TestCaseError> {
+    fn kinematics_agree<const N: usize, J: Joint<3, N>>(
+        joint: J,
+        x: &[f64],
+        q_ddot: [f64; 3],
+    ) -> Result<(), TestCaseError> {
         let p = Vector3::new(0.3, -0.1, 0.7);
         let q_ddot = Vector::<f64, N>::from_column_slice(&q_ddot[..N]);
         let mut x_dot = vec![0.0; J::STATES];
@@ -364,7 +396,9 @@ mod tests {
     /// theta > 0 lifts the tip: the sign convention of (1) in one place.
     #[test]
     fn positive_theta_lifts_the_tip() {
-        let tip = Universal.pose(&[0.0, 0.1, 0.0, 0.0]).point(&Vector3::new(1.0, 0.0, 0.0));
+        let tip = Universal
+            .pose(&[0.0, 0.1, 0.0, 0.0])
+            .point(&Vector3::new(1.0, 0.0, 0.0));
         assert!(tip.r.z > 0.0 && tip.r.x > 0.0);
         let tip = Planar.pose(&[0.1, 0.0]).point(&Vector2::new(1.0, 0.0));
         assert!(tip.r.y > 0.0);

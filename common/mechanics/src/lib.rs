@@ -14,7 +14,10 @@
 //! numbers are those of the models' documentation ([`element`]).
 
 #![forbid(unsafe_code)]
-#![allow(non_snake_case, reason = "fields and locals carry the paper's symbols: F, M, G, Y, R")]
+#![allow(
+    non_snake_case,
+    reason = "fields and locals carry the paper's symbols: F, M, G, Y, R"
+)]
 
 pub mod chain;
 pub mod closure;
@@ -25,7 +28,7 @@ pub mod space;
 pub mod spring;
 
 pub use chain::Chain;
-pub use closure::{Closure, InconsistentClosure, close};
+pub use closure::{Conditioning, InconsistentClosure, close, conditioning};
 pub use element::{Body, Force, Hinged, Load, NotPositiveDefinite, Point, Tip};
 pub use joint::{Joint, Planar, Pose, Revolute, Rigid, Spherical, Universal};
 pub use scalar::Scalar;

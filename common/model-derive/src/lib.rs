@@ -20,13 +20,18 @@
 use proc_macro::TokenStream;
 use proc_macro2::{TokenStream as Tokens, TokenTree};
 use quote::{format_ident, quote};
-use syn::{Attribute, Data, DeriveInput, Expr, ExprLit, Field, Fields, Lit, Meta, parse_macro_input, spanned::Spanned};
+use syn::{
+    Attribute, Data, DeriveInput, Expr, ExprLit, Field, Fields, Lit, Meta, parse_macro_input,
+    spanned::Spanned,
+};
 
 /// Implement `model::Variables` for a struct. See the crate documentation for the attributes.
 #[proc_macro_derive(Variables, attributes(variables, var))]
 pub fn variables(input: TokenStream) -> TokenStream {
     let input = parse_macro_input!(input as DeriveInput);
-    expand_variables(&input).unwrap_or_else(|e| e.to_compile_error()).into()
+    expand_variables(&input)
+        .unwrap_or_else(|e| e.to_compile_error())
+        .into()
 }
 
 /// Implement `model::Variables<f64>` and `From<i64>`-like access for a field-less enum whose items
@@ -34,7 +39,9 @@ pub fn variables(input: TokenStream) -> TokenStream {
 #[proc_macro_derive(Enumeration)]
 pub fn enumeration(input: TokenStream) -> TokenStream {
     let input = parse_macro_input!(input as DeriveInput);
-    expand_enumeration(&input).unwrap_or_else(|e| e.to_compile_error()).into()
+    expand_enumeration(&input)
+        .unwrap_or_else(|e| e.to_compile_error())
+        .into()
 }
 
 /// First paragraph of the documentation, with the unit taken off its end.
@@ -82,7 +89,9 @@ struct FieldAttributes {
 /// A start value as f64: Booleans become 0 and 1.
 fn number(e: &Expr) -> Tokens {
     match e {
-        Expr::Lit(ExprLit { lit: Lit::Bool(b), .. }) => {
+        Expr::Lit(ExprLit {
+            lit: Lit::Bool(b), ..
+        }) => {
             let v = f64::from(u8::from(b.value));
             quote!(#v)
         }
@@ -149,9 +158,10 @@ fn concrete(tokens: Tokens, scalar: Option<&syn::Ident>) -> Tokens {
         .into_iter()
         .map(|tree| match (tree, scalar) {
             (TokenTree::Ident(i), Some(s)) if i == *s => TokenTree::Ident(format_ident!("f64")),
-            (TokenTree::Group(g), _) => {
-                TokenTree::Group(proc_macro2::Group::new(g.delimiter(), concrete(g.stream(), scalar)))
-            }
+            (TokenTree::Group(g), _) => TokenTree::Group(proc_macro2::Group::new(
+                g.delimiter(),
+                concrete(g.stream(), scalar),
+            )),
             (tree, _) => tree,
         })
         .collect()
@@ -161,17 +171,10 @@ fn option(v: Option<&Tokens>) -> Tokens {
     v.map_or_else(|| quote!(None), |v| quote!(Some(#v)))
 }
 
-fn expand_variables(input: &DeriveInput) -> syn::Result<Tokens> {
-    let name = &input.ident;
-    let Data::Struct(data) = &input.data else {
-        return Err(syn::Error::new(name.span(), "Variables is derived for structs"));
-    };
-    let Fields::Named(fields) = &data.fields else {
-        return Err(syn::Error::new(name.span(), "fields need names"));
-    };
-    let scalar = input.generics.type_params().next().map(|p| p.ident.clone());
+/// The causality that `#[variables(...)]` gives to all fields.
+fn struct_causality(attrs: &[Attribute]) -> syn::Result<&'static str> {
     let mut causality = "Inherit";
-    for attr in input.attrs.iter().filter(|a| a.path().is_ident("variables")) {
+    for attr in attrs.iter().filter(|a| a.path().is_ident("variables")) {
         attr.parse_nested_meta(|meta| {
             causality = match meta.path.get_ident().map(ToString::to_string).as_deref() {
                 Some("parameter") => "Parameter",
@@ -183,22 +186,46 @@ fn expand_variables(input: &DeriveInput) -> syn::Result<Tokens> {
             Ok(())
         })?;
     }
+    Ok(causality)
+}
 
+fn expand_variables(input: &DeriveInput) -> syn::Result<Tokens> {
+    let name = &input.ident;
+    let Data::Struct(data) = &input.data else {
+        return Err(syn::Error::new(name.span(), "Variables is derived for structs"));
+    };
+    let Fields::Named(fields) = &data.fields else {
+        return Err(syn::Error::new(name.span(), "fields need names"));
+    };
+    let scalar = input.generics.type_params().next().map(|p| p.ident.clone());
+    let causality = struct_causality(&input.attrs)?;
     let (mut lengths, mut fills, mut loads, mut stores) = (vec![], vec![], vec![], vec![]);
     let number_type = scalar.as_ref().map_or_else(|| quote!(f64), |s| quote!(#s));
     for field in &fields.named {
-        let ident = field.ident.as_ref().ok_or_else(|| syn::Error::new(field.span(), "name"))?;
+        let ident = field
+            .ident
+            .as_ref()
+            .ok_or_else(|| syn::Error::new(field.span(), "name"))?;
         let a = field_attributes(field)?;
         let ty = &field.ty;
         let at_f64 = concrete(quote!(#ty), scalar.as_ref());
         let table = quote!(<#at_f64 as ::model::Variables<f64>>::TABLE);
         let (description, unit) = documentation(&field.attrs);
         let unit = a.unit.or(unit).unwrap_or_default();
-        let unit = if unit == "1" || unit == "-" { String::new() } else { unit };
-        let (prefix, start, depends, tunable, discrete) = (&a.prefix, &a.start, &a.depends, a.tunable, a.discrete);
+        let unit = if unit == "1" || unit == "-" {
+            String::new()
+        } else {
+            unit
+        };
+        let (prefix, start, depends, tunable, discrete) =
+            (&a.prefix, &a.start, &a.depends, a.tunable, a.discrete);
         let field_causality = format_ident!("{}", if a.local { "Local" } else { causality });
         let initial = format_ident!("{}", a.initial.unwrap_or("Calculated"));
-        let (min, max, nominal) = (option(a.min.as_ref()), option(a.max.as_ref()), option(a.nominal.as_ref()));
+        let (min, max, nominal) = (
+            option(a.min.as_ref()),
+            option(a.max.as_ref()),
+            option(a.nominal.as_ref()),
+        );
         lengths.push(quote!(#table.len()));
         fills.push(quote! {
             table = ::model::fill(table, at, #table, &::model::Attributes {
@@ -244,6 +271,7 @@ fn expand_variables(input: &DeriveInput) -> syn::Result<Tokens> {
     });
     Ok(quote! {
         impl #generics ::model::Variables<#number_type> for #target {
+            #[allow(clippy::large_stack_arrays, reason = "evaluated by the compiler")]
             const TABLE: &'static [::model::Entry] = &{
                 const N: usize = 0 #(+ #lengths)*;
                 let mut table = [::model::Entry::scalar("", ::model::Kind::Float64); N];
@@ -299,7 +327,9 @@ fn expand_enumeration(input: &DeriveInput) -> syn::Result<Tokens> {
         });
     }
     let variants: Vec<_> = data.variants.iter().map(|v| &v.ident).collect();
-    let first = variants.first().ok_or_else(|| syn::Error::new(name.span(), "no items"))?;
+    let first = variants
+        .first()
+        .ok_or_else(|| syn::Error::new(name.span(), "no items"))?;
     Ok(quote! {
         impl ::model::Variables<f64> for #name {
             const TABLE: &'static [::model::Entry] = &[{
@@ -313,8 +343,9 @@ fn expand_enumeration(input: &DeriveInput) -> syn::Result<Tokens> {
                 entry
             }];
             fn load(values: &[f64]) -> Self {
-                let index = values[0];
-                #(if index == #name::#variants as i64 as f64 { return #name::#variants; })*
+                #[allow(clippy::cast_possible_truncation, reason = "items are whole numbers")]
+                let index = values[0] as i64;
+                #(if index == #name::#variants as i64 { return #name::#variants; })*
                 unreachable!("values are checked when they are set")
             }
             fn store(&self, values: &mut [f64]) {

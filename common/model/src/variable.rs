@@ -164,6 +164,9 @@ impl Entry {
     }
 
     /// This entry as a component of a field with the given attributes.
+    ///
+    /// # Panics
+    /// At compile time, if groups are nested more deeply than names have parts.
     #[must_use]
     pub const fn within(mut self, a: &Attributes, component: usize) -> Self {
         let mut i = Self::PARTS - 1;
@@ -184,9 +187,13 @@ impl Entry {
         }
         if a.tunable {
             self.variability = Variability::Tunable;
-        } else if a.discrete || !matches!(self.kind, Kind::Float64) && matches!(self.causality, Causality::Local) {
+        } else if a.discrete
+            || !matches!(self.kind, Kind::Float64) && matches!(self.causality, Causality::Local)
+        {
             self.variability = Variability::Discrete;
-        } else if matches!(self.causality, Causality::Parameter) && matches!(self.variability, Variability::Continuous) {
+        } else if matches!(self.causality, Causality::Parameter)
+            && matches!(self.variability, Variability::Continuous)
+        {
             self.variability = Variability::Fixed;
         }
         if !matches!(a.initial, Initial::Calculated) {

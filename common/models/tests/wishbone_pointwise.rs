@@ -4,7 +4,9 @@
 use std::collections::HashMap;
 
 use model::{Model, System, Visitor};
-use models::suspension::{DoubleWishbone, Dynamics, Energy, Inputs, Motion, Parameters, PreloadMode, PulsePhase, SceneMotion};
+use models::suspension::{
+    DoubleWishbone, Dynamics, Energy, Inputs, Motion, Parameters, PreloadMode, PulsePhase, SceneMotion,
+};
 
 /// A reference trajectory by column name.
 struct Reference {
@@ -14,16 +16,30 @@ struct Reference {
 
 impl Reference {
     fn read(name: &str) -> Self {
-        let path = format!("{}/../../tests/reference/suspension/{name}.csv", env!("CARGO_MANIFEST_DIR"));
+        let path = format!(
+            "{}/../../tests/reference/suspension/{name}.csv",
+            env!("CARGO_MANIFEST_DIR")
+        );
         let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path}: {e}"));
         let mut lines = text.lines().filter(|l| !l.starts_with('#'));
-        let columns = lines.next().expect("header").split(',').map(String::from).collect();
-        let rows = lines.map(|l| l.split(',').map(|v| v.parse().expect("number")).collect()).collect();
+        let columns = lines
+            .next()
+            .expect("header")
+            .split(',')
+            .map(String::from)
+            .collect();
+        let rows = lines
+            .map(|l| l.split(',').map(|v| v.parse().expect("number")).collect())
+            .collect();
         Self { columns, rows }
     }
 
     fn row(&self, i: usize) -> HashMap<&str, f64> {
-        self.columns.iter().map(String::as_str).zip(self.rows[i].iter().copied()).collect()
+        self.columns
+            .iter()
+            .map(String::as_str)
+            .zip(self.rows[i].iter().copied())
+            .collect()
     }
 }
 
@@ -38,7 +54,10 @@ type Values = (Motion<f64>, Dynamics<f64>, Energy<f64>, Vec<f64>);
 
 impl Visitor<DoubleWishbone> for At<'_> {
     type Output = Values;
-    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = DoubleWishbone>>(self, system: &Y) -> Values {
+    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = DoubleWishbone>>(
+        self,
+        system: &Y,
+    ) -> Values {
         let u = <Inputs<f64> as model::Variables<f64>>::load(&[0.0; 21]);
         let mut x = [0.0; N];
         x[..self.x.len()].copy_from_slice(self.x);
@@ -59,14 +78,28 @@ fn vector(row: &HashMap<&str, f64>, name: &str) -> [f64; 3] {
 /// Largest difference of points [m] and of forces [N] in a row.
 fn differences(row: &HashMap<&str, f64>, (m, d, e, _): &Values) -> (f64, f64, f64) {
     let worst = |pairs: &[(&str, [f64; 3])]| {
-        pairs.iter().flat_map(|(name, v)| {
-            let reference = vector(row, name);
-            (0..3).map(move |i| (v[i] - reference[i]).abs())
-        }).fold(0.0, f64::max)
+        pairs
+            .iter()
+            .flat_map(|(name, v)| {
+                let reference = vector(row, name);
+                (0..3).map(move |i| (v[i] - reference[i]).abs())
+            })
+            .fold(0.0, f64::max)
     };
-    let points = worst(&[("B.r", m.B_r.into()), ("C.r", m.C_r.into()), ("P.r", m.P_r.into())]);
-    let forces = worst(&[("A.F", d.A_F.into()), ("B.F", d.B_F.into()), ("C.F", d.C_F.into()), ("D.F", d.D_F.into())]);
-    let energies = (e.kinetic - row["energy.kinetic"]).abs().max((e.potential - row["energy.potential"]).abs());
+    let points = worst(&[
+        ("B.r", m.B_r.into()),
+        ("C.r", m.C_r.into()),
+        ("P.r", m.P_r.into()),
+    ]);
+    let forces = worst(&[
+        ("A.F", d.A_F.into()),
+        ("B.F", d.B_F.into()),
+        ("C.F", d.C_F.into()),
+        ("D.F", d.D_F.into()),
+    ]);
+    let energies = (e.kinetic - row["energy.kinetic"])
+        .abs()
+        .max((e.potential - row["energy.potential"]).abs());
     (points, forces, energies)
 }
 
@@ -81,7 +114,11 @@ fn paper_case_agrees_at_every_reference_state() {
     let wishbone = DoubleWishbone::new(&Parameters::default()).expect("defaults");
     for i in 0..reference.rows.len() {
         let row = reference.row(i);
-        let values = wishbone.with_system(At { t: row["t"], x: &planar_states(&row), pulse: PulsePhase::After });
+        let values = wishbone.with_system(At {
+            t: row["t"],
+            x: &planar_states(&row),
+            pulse: PulsePhase::After,
+        });
         let (points, forces, energies) = differences(&row, &values);
         assert!(points < 1e-14, "points {points:e} at t = {}", row["t"]);
         assert!(forces < 1e-9, "forces {forces:e} at t = {}", row["t"]);
@@ -96,7 +133,12 @@ fn paper_case_agrees_at_every_reference_state() {
 #[test]
 fn road_case_agrees_at_every_reference_state() {
     let reference = Reference::read("wishbone_road");
-    let mut p = Parameters { preload_mode: PreloadMode::Static, pulse_start: 0.5, pulse_duration: 0.08, ..Parameters::default() };
+    let mut p = Parameters {
+        preload_mode: PreloadMode::Static,
+        pulse_start: 0.5,
+        pulse_duration: 0.08,
+        ..Parameters::default()
+    };
     p.gravity.z = -9.80665;
     p.static_load.z = 3500.0;
     p.force_offset.z = 3500.0;
@@ -105,8 +147,16 @@ fn road_case_agrees_at_every_reference_state() {
     let wishbone = DoubleWishbone::new(&p).expect("road case");
     for i in 0..reference.rows.len() {
         let row = reference.row(i);
-        let pulse = if row["t"] >= 0.5 && row["t"] < 0.58 { PulsePhase::During } else { PulsePhase::After };
-        let values = wishbone.with_system(At { t: row["t"], x: &planar_states(&row), pulse });
+        let pulse = if row["t"] >= 0.5 && row["t"] < 0.58 {
+            PulsePhase::During
+        } else {
+            PulsePhase::After
+        };
+        let values = wishbone.with_system(At {
+            t: row["t"],
+            x: &planar_states(&row),
+            pulse,
+        });
         let (points, forces, energies) = differences(&row, &values);
         assert!(points < 1e-14, "points {points:e} at t = {}", row["t"]);
         assert!(forces < 2e-8, "forces {forces:e} at t = {}", row["t"]);
@@ -119,15 +169,37 @@ fn road_case_agrees_at_every_reference_state() {
 #[test]
 fn spatial_case_agrees_at_every_reference_state() {
     let reference = Reference::read("wishbone_spatial");
-    let mut p = Parameters { motion: SceneMotion::Spatial, use_tie: true, preload_mode: PreloadMode::Static, ..Parameters::default() };
+    let mut p = Parameters {
+        motion: SceneMotion::Spatial,
+        use_tie: true,
+        preload_mode: PreloadMode::Static,
+        ..Parameters::default()
+    };
     p.gravity.z = -9.80665;
     p.force_amplitude = model::Vector3::new(0.0, 100.0, 200.0);
     p.force_omega = model::Vector3::new(10.0, 8.0, 13.0);
     let wishbone = DoubleWishbone::new(&p).expect("spatial case");
     for i in 0..reference.rows.len() {
         let row = reference.row(i);
-        let x = ["theta1", "theta1_dot", "q1", "q2", "q3", "q4", "w.x", "w.y", "w.z", "theta3", "theta3_dot"].map(|c| row[c]);
-        let values = wishbone.with_system(At { t: row["t"], x: &x, pulse: PulsePhase::After });
+        let x = [
+            "theta1",
+            "theta1_dot",
+            "q1",
+            "q2",
+            "q3",
+            "q4",
+            "w.x",
+            "w.y",
+            "w.z",
+            "theta3",
+            "theta3_dot",
+        ]
+        .map(|c| row[c]);
+        let values = wishbone.with_system(At {
+            t: row["t"],
+            x: &x,
+            pulse: PulsePhase::After,
+        });
         let (points, forces, energies) = differences(&row, &values);
         assert!(points < 1e-14, "points {points:e} at t = {}", row["t"]);
         assert!(forces < 1e-7, "forces {forces:e} at t = {}", row["t"]);

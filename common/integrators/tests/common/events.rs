@@ -27,9 +27,7 @@ impl Ode<1> for Drift {
 /// Indicators from a closure.
 pub(crate) struct When<F>(pub(crate) F);
 
-impl<const N: usize, const M: usize, F: Fn(f64, &[f64; N]) -> [f64; M]> Indicators<N, M>
-    for When<F>
-{
+impl<const N: usize, const M: usize, F: Fn(f64, &[f64; N]) -> [f64; M]> Indicators<N, M> for When<F> {
     fn indicators(&self, t: f64, x: &[f64; N]) -> [f64; M] {
         (self.0)(t, x)
     }

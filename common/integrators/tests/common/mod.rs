@@ -79,11 +79,7 @@ pub(crate) fn assert_order(errors: &[f64], order: f64) {
 }
 
 pub(crate) fn distance<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| (a - b).powi(2))
-        .sum::<f64>()
-        .sqrt()
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
 /// `x' = -x^2 cos t`, solution `1 / (2 + sin t)`.

@@ -40,7 +40,12 @@ impl ArmCoordinates<2, 1> for Planar {
     }
     fn angles<S: Scalar>(&self, x: &[S]) -> LinkAngles<S> {
         let o = S::lift(0.0);
-        LinkAngles { theta: x[0], phi: o, theta_dot: x[1], phi_dot: o }
+        LinkAngles {
+            theta: x[0],
+            phi: o,
+            theta_dot: x[1],
+            phi_dot: o,
+        }
     }
 }
 
@@ -54,7 +59,12 @@ impl ArmCoordinates<3, 1> for Revolute {
         x.copy_from_slice(&[theta, 0.0]);
     }
     fn angles<S: Scalar>(&self, x: &[S]) -> LinkAngles<S> {
-        LinkAngles { theta: x[0], phi: S::lift(self.phi), theta_dot: x[1], phi_dot: S::lift(0.0) }
+        LinkAngles {
+            theta: x[0],
+            phi: S::lift(self.phi),
+            theta_dot: x[1],
+            phi_dot: S::lift(0.0),
+        }
     }
 }
 
@@ -69,7 +79,12 @@ impl ArmCoordinates<3, 2> for Universal {
         x.copy_from_slice(&[phi, theta, 0.0, 0.0]);
     }
     fn angles<S: Scalar>(&self, x: &[S]) -> LinkAngles<S> {
-        LinkAngles { theta: x[1], phi: x[0], theta_dot: x[3], phi_dot: x[2] }
+        LinkAngles {
+            theta: x[1],
+            phi: x[0],
+            theta_dot: x[3],
+            phi_dot: x[2],
+        }
     }
 }
 
@@ -95,7 +110,11 @@ impl CarrierCoordinates<2, 1> for Planar {
         x.fill(0.0);
     }
     fn orientation<S: Scalar>(x: &[S]) -> CarrierOrientation<S> {
-        CarrierOrientation { psi: x[0], psi_dot: x[1], ..unused() }
+        CarrierOrientation {
+            psi: x[0],
+            psi_dot: x[1],
+            ..unused()
+        }
     }
 }
 
@@ -107,14 +126,19 @@ impl CarrierCoordinates<3, 2> for Universal {
         x.fill(0.0);
     }
     fn orientation<S: Scalar>(x: &[S]) -> CarrierOrientation<S> {
-        CarrierOrientation { phi: x[0], theta: x[1], phi_dot: x[2], theta_dot: x[3], ..unused() }
+        CarrierOrientation {
+            phi: x[0],
+            theta: x[1],
+            phi_dot: x[2],
+            theta_dot: x[3],
+            ..unused()
+        }
     }
 }
 
 impl CarrierCoordinates<3, 3> for Spherical {
     const NEW: Self = Self;
-    const NAMES: &'static [&'static str] =
-        &["q[1]", "q[2]", "q[3]", "q[4]", "omega.x", "omega.y", "omega.z"];
+    const NAMES: &'static [&'static str] = &["q[1]", "q[2]", "q[3]", "q[4]", "omega.x", "omega.y", "omega.z"];
     fn design(x: &mut [f64]) {
         x.fill(0.0);
         x[0] = 1.0;

@@ -1,8 +1,11 @@
 //! The double wishbone as a model: parameters checked, structure chosen, equations in named groups.
 
-use mechanics::{Dim, Planar, Revolute, Rigid, Scalar, Space, Spherical, SpringDamper, Universal, Vector};
+use mechanics::{
+    Dim, Planar, Revolute, Rigid, Scalar, Space, Spherical, SpringDamper, Universal, Vector, conditioning,
+};
 use model::{
-    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, SymmetricTensor, System, Vector3, Visitor,
+    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, SymmetricTensor, System, Vector3,
+    Visitor,
 };
 
 use super::coordinates::{ArmCoordinates, CarrierCoordinates};
@@ -48,9 +51,11 @@ macro_rules! each {
 
 impl Model for DoubleWishbone {
     const NAME: &'static str = "double_wishbone";
-    const DESCRIPTION: &'static str =
-        "Double wishbone wheel suspension: two links, carrier with wheel, strut, closed at the upper chassis joint";
-    const EXPERIMENT: Experiment = Experiment { stop: 10.0, step: 0.05 };
+    const DESCRIPTION: &'static str = "Double wishbone wheel suspension: two links, carrier with wheel, strut, closed at the upper chassis joint";
+    const EXPERIMENT: Experiment = Experiment {
+        stop: 10.0,
+        step: 0.05,
+    };
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;
@@ -63,12 +68,23 @@ impl Model for DoubleWishbone {
         check(p)?;
         let structure = match (p.motion, p.arm_joint, p.carrier_joint) {
             (SceneMotion::Planar, ..) => Structure::Planar(Wishbone::new(p)?),
-            (_, ArmJoint::Revolute, CarrierJoint::Spherical) => Structure::RevoluteSpherical(Wishbone::new(p)?),
-            (_, ArmJoint::Revolute, CarrierJoint::Universal) => Structure::RevoluteUniversal(Wishbone::new(p)?),
-            (_, ArmJoint::Universal, CarrierJoint::Spherical) => Structure::UniversalSpherical(Wishbone::new(p)?),
-            (_, ArmJoint::Universal, CarrierJoint::Universal) => Structure::UniversalUniversal(Wishbone::new(p)?),
+            (_, ArmJoint::Revolute, CarrierJoint::Spherical) => {
+                Structure::RevoluteSpherical(Wishbone::new(p)?)
+            }
+            (_, ArmJoint::Revolute, CarrierJoint::Universal) => {
+                Structure::RevoluteUniversal(Wishbone::new(p)?)
+            }
+            (_, ArmJoint::Universal, CarrierJoint::Spherical) => {
+                Structure::UniversalSpherical(Wishbone::new(p)?)
+            }
+            (_, ArmJoint::Universal, CarrierJoint::Universal) => {
+                Structure::UniversalUniversal(Wishbone::new(p)?)
+            }
         };
-        Ok(Self { structure, parameters: p.clone() })
+        Ok(Self {
+            structure,
+            parameters: p.clone(),
+        })
     }
 
     fn retune(&mut self, p: &Parameters) {
@@ -80,7 +96,8 @@ impl Model for DoubleWishbone {
         let p = &self.parameters;
         let mut warnings = vec![];
         let masses = [p.lower_mass, p.carrier_mass, p.upper_mass];
-        let ratio = masses.iter().copied().fold(0.0, f64::max) / masses.iter().copied().fold(f64::INFINITY, f64::min);
+        let ratio =
+            masses.iter().copied().fold(0.0, f64::max) / masses.iter().copied().fold(f64::INFINITY, f64::min);
         if ratio > MASS_RATIO {
             warnings.push(format!(
                 "lower.mass, carrier.mass, upper.mass = {masses:?} kg: ratio {ratio:.1e} above {MASS_RATIO:.0e}, expect a loss of accuracy"
@@ -107,8 +124,18 @@ impl Model for DoubleWishbone {
     }
 }
 
-fn refused(variable: &'static str, value: f64, reason: impl Into<String>, allowed: impl Into<String>) -> ParameterError {
-    ParameterError::Refused { variable, value, reason: reason.into(), allowed: allowed.into() }
+fn refused(
+    variable: &'static str,
+    value: f64,
+    reason: impl Into<String>,
+    allowed: impl Into<String>,
+) -> ParameterError {
+    ParameterError::Refused {
+        variable,
+        value,
+        reason: reason.into(),
+        allowed: allowed.into(),
+    }
 }
 
 /// Conditions between parameters.
@@ -118,18 +145,33 @@ fn check(p: &Parameters) -> Result<(), ParameterError> {
         if length > 1e-6 && length.is_finite() {
             return Ok(length);
         }
-        Err(refused(name[1], length, format!("its distance to {} is this many metres", name[0]), "distance > 1e-6 m"))
+        Err(refused(
+            name[1],
+            length,
+            format!("its distance to {} is this many metres", name[0]),
+            "distance > 1e-6 m",
+        ))
     };
     between(["design.A", "design.B"], &p.A, &p.B)?;
     between(["design.B", "design.C"], &p.B, &p.C)?;
     let upper = between(["design.D", "design.C"], &p.D, &p.C)?;
     if p.s1 > upper {
-        return Err(refused("strut.s1", p.s1, "S must lie on the upper link", format!("0 < strut.s1 <= {upper:.6} m")));
+        return Err(refused(
+            "strut.s1",
+            p.s1,
+            "S must lie on the upper link",
+            format!("0 < strut.s1 <= {upper:.6} m"),
+        ));
     }
     if p.motion == SceneMotion::Planar {
         let points = [
-            ("design.A.y", &p.A), ("design.B.y", &p.B), ("design.C.y", &p.C), ("design.D.y", &p.D),
-            ("design.G.y", &p.G), ("design.P.y", &p.P), ("design.T.y", &p.T),
+            ("design.A.y", &p.A),
+            ("design.B.y", &p.B),
+            ("design.C.y", &p.C),
+            ("design.D.y", &p.D),
+            ("design.G.y", &p.G),
+            ("design.P.y", &p.P),
+            ("design.T.y", &p.T),
         ];
         for (name, point) in points {
             if !point.y.vanishes() {
@@ -157,7 +199,12 @@ fn positive_inertia(smallest: f64) -> Result<(), ParameterError> {
     if smallest > 0.0 {
         return Ok(());
     }
-    Err(refused("carrier.inertia", smallest, "the smallest principal moment is not positive", "positive definite"))
+    Err(refused(
+        "carrier.inertia",
+        smallest,
+        "the smallest principal moment is not positive",
+        "positive definite",
+    ))
 }
 
 /// Azimuth and elevation of a link vector; in the plane the azimuth is zero.
@@ -181,17 +228,29 @@ where
         let (L_1, L_3) = ((p.B - p.A).norm(), (p.C - p.D).norm());
         let rod = |m: f64, L: f64, Ixx: f64| {
             let across = m * L * L / 12.0;
-            Rigid { m, c: along(0.5 * L), I_c: SymmetricTensor::diagonal(Ixx, across, across).matrix() }
+            Rigid {
+                m,
+                c: along(0.5 * L),
+                I_c: SymmetricTensor::diagonal(Ixx, across, across).matrix(),
+            }
         };
         let (design_lower, design_upper) = (link_angles(&(p.B - p.A)), link_angles(&(p.C - p.D)));
         let foot = p.D + (p.C - p.D) * (p.s1 / L_3);
-        let l0 = if p.strut_l0 > 0.0 { p.strut_l0 } else { (p.T - foot).norm() };
+        let l0 = if p.strut_l0 > 0.0 {
+            p.strut_l0
+        } else {
+            (p.T - foot).norm()
+        };
         let mut w = Self {
             lower_joint: A::at_azimuth(design_lower.0),
             carrier_joint: C::NEW,
             upper_joint: A::at_azimuth(design_upper.0),
             lower: rod(p.lower_mass, L_1, p.lower_Ixx),
-            carrier: Rigid { m: p.carrier_mass, c: part(p.G - p.B), I_c: p.carrier_inertia.matrix() },
+            carrier: Rigid {
+                m: p.carrier_mass,
+                c: part(p.G - p.B),
+                I_c: p.carrier_inertia.matrix(),
+            },
             upper: rod(p.upper_mass, L_3, p.upper_Ixx),
             r_AB: along(L_1),
             r_BC: part(p.C - p.B),
@@ -203,14 +262,30 @@ where
             r_D: part(p.D),
             r_T: part(p.T),
             r_tie: part(p.tie_T),
-            strut: SpringDamper { k: 0.0, c: None, l0, F_pre: 0.0 },
-            tie: p.use_tie.then(|| SpringDamper { k: 0.0, c: None, l0: part(p.tie_T - p.tie_R).norm(), F_pre: 0.0 }),
+            strut: SpringDamper {
+                k: 0.0,
+                c: None,
+                l0,
+                F_pre: 0.0,
+            },
+            tie: p.use_tie.then(|| SpringDamper {
+                k: 0.0,
+                c: None,
+                l0: part(p.tie_T - p.tie_R).norm(),
+                F_pre: 0.0,
+            }),
             gravity: None,
             load: (p.force_kind == ForceKind::Internal).then(|| LoadLaw::new(p)),
             closing: match (p.closure, p.stabilisation) {
-                (ClosureKind::Bushing, _) => Closing::Bushing { k: p.closure_k, c: p.closure_c },
+                (ClosureKind::Bushing, _) => Closing::Bushing {
+                    k: p.closure_k,
+                    c: p.closure_c,
+                },
                 (_, StabilisationKind::None) => Closing::Rigid,
-                (_, StabilisationKind::Baumgarte) => Closing::Baumgarte { a: p.stabilisation_a, b: p.stabilisation_b },
+                (_, StabilisationKind::Baumgarte) => Closing::Baumgarte {
+                    a: p.stabilisation_a,
+                    b: p.stabilisation_b,
+                },
                 (_, StabilisationKind::Projection) => Closing::Projection,
             },
             energy: p.use_energy,
@@ -236,7 +311,10 @@ where
             tie.k = p.tie_k;
             tie.c = Some(p.tie_c);
         }
-        self.gravity = p.use_gravity.then(|| Dim::<D>::restrict(&p.gravity)).filter(|g| !g.iter().all(|g| g.vanishes()));
+        self.gravity = p
+            .use_gravity
+            .then(|| Dim::<D>::restrict(&p.gravity))
+            .filter(|g| !g.iter().all(|g| g.vanishes()));
     }
 }
 
@@ -254,25 +332,55 @@ macro_rules! system {
             }
 
             #[inline]
-            fn rates<S: Scalar>(&self, t: S, x: &[S; $n], u: &Inputs<S>, d: &PulsePhase) -> Result<[S; $n], EvaluationError> {
+            fn rates<S: Scalar>(
+                &self,
+                t: S,
+                x: &[S; $n],
+                u: &Inputs<S>,
+                d: &PulsePhase,
+            ) -> Result<[S; $n], EvaluationError> {
                 let mut x_dot = [S::lift(0.0); $n];
                 self.state_rates(t, x, u, *d, &mut x_dot)?;
                 Ok(x_dot)
             }
 
-            fn motion<S: Scalar>(&self, _t: S, x: &[S; $n], _u: &Inputs<S>, _d: &PulsePhase) -> Result<Motion<S>, EvaluationError> {
+            fn motion<S: Scalar>(
+                &self,
+                _t: S,
+                x: &[S; $n],
+                _u: &Inputs<S>,
+                _d: &PulsePhase,
+            ) -> Result<Motion<S>, EvaluationError> {
                 self.motion_outputs(x)
             }
 
-            fn inertia<S: Scalar>(&self, _t: S, _x: &[S; $n], _u: &Inputs<S>, _d: &PulsePhase) -> Result<NoVariables, EvaluationError> {
+            fn inertia<S: Scalar>(
+                &self,
+                _t: S,
+                _x: &[S; $n],
+                _u: &Inputs<S>,
+                _d: &PulsePhase,
+            ) -> Result<NoVariables, EvaluationError> {
                 Ok(NoVariables)
             }
 
-            fn dynamics<S: Scalar>(&self, t: S, x: &[S; $n], u: &Inputs<S>, d: &PulsePhase) -> Result<Dynamics<S>, EvaluationError> {
+            fn dynamics<S: Scalar>(
+                &self,
+                t: S,
+                x: &[S; $n],
+                u: &Inputs<S>,
+                d: &PulsePhase,
+            ) -> Result<Dynamics<S>, EvaluationError> {
                 self.dynamic_outputs(t, x, u, *d)
             }
 
-            fn energy<S: Scalar>(&self, _t: S, x: &[S; $n], _u: &Inputs<S>, _d: &PulsePhase) -> Result<Energy<S>, EvaluationError> {
+            fn energy<S: Scalar>(
+                &self,
+                _t: S,
+                x: &[S; $n],
+                _u: &Inputs<S>,
+                _d: &PulsePhase,
+            ) -> Result<Energy<S>, EvaluationError> {
                 self.energy_outputs(x)
             }
 
@@ -283,7 +391,13 @@ macro_rules! system {
 
             fn nominals(&self) -> [f64; $n] {
                 // energy integrals are quadratures: they follow the states and do not choose the step
-                std::array::from_fn(|i| if i < Self::MECHANICAL { 1.0 } else { f64::INFINITY })
+                std::array::from_fn(|i| {
+                    if i < Self::MECHANICAL {
+                        1.0
+                    } else {
+                        f64::INFINITY
+                    }
+                })
             }
 
             fn project(&self, _t: f64, x: &mut [f64; $n]) -> Result<bool, EvaluationError> {
@@ -336,7 +450,12 @@ where
             ("lower.angle_rate.theta", given.lower_theta_dot, 0.0),
         ] {
             if value != default {
-                return Err(refused(variable, value, "the start follows from the design points while start.override = false", format!("{default}, or start.override = true")));
+                return Err(refused(
+                    variable,
+                    value,
+                    "the start follows from the design points while start.override = false",
+                    format!("{default}, or start.override = true"),
+                ));
             }
         }
         self.design_states(x);
@@ -344,7 +463,14 @@ where
     }
 
     #[inline]
-    fn state_rates<S: Scalar>(&self, t: S, x: &[S], u: &Inputs<S>, d: PulsePhase, x_dot: &mut [S]) -> Result<(), EvaluationError> {
+    fn state_rates<S: Scalar>(
+        &self,
+        t: S,
+        x: &[S],
+        u: &Inputs<S>,
+        d: PulsePhase,
+        x_dot: &mut [S],
+    ) -> Result<(), EvaluationError> {
         let k = self.kinematics(x)?;
         let loads = self.loads(t, u, d);
         let a = self.accelerate(&k, &loads)?;
@@ -387,12 +513,19 @@ where
         })
     }
 
-    fn dynamic_outputs<S: Scalar>(&self, t: S, x: &[S], u: &Inputs<S>, d: PulsePhase) -> Result<Dynamics<S>, EvaluationError> {
+    fn dynamic_outputs<S: Scalar>(
+        &self,
+        t: S,
+        x: &[S],
+        u: &Inputs<S>,
+        d: PulsePhase,
+    ) -> Result<Dynamics<S>, EvaluationError> {
         let k = self.kinematics(x)?;
         let a = self.accelerate(&k, &self.loads(t, u, d))?;
         let world = |v: Vector<S, D>| Dim::<D>::embed(&v);
+        let determined = a.closure.map(|Y| conditioning(&Y));
         #[allow(clippy::cast_precision_loss, reason = "0..3")]
-        let rank = S::lift(a.rank as f64);
+        let rank = S::lift(determined.map_or(0, |c| c.rank) as f64);
         Ok(Dynamics {
             P_a: world(a.a_P),
             B_a: world(a.a_B),
@@ -402,7 +535,7 @@ where
             T_F: world(-(k.strut.e * k.strut.F_s)),
             B_F: world(a.F_B),
             C_F: world(a.F_C),
-            condition: a.condition,
+            condition: determined.map_or(S::lift(1.0), |c| c.condition),
             rank,
         })
     }
@@ -410,12 +543,22 @@ where
     fn energy_outputs<S: Scalar>(&self, x: &[S]) -> Result<Energy<S>, EvaluationError> {
         let (kinetic, potential) = self.energies(&self.kinematics(x)?);
         let [dissipated, supplied, port] = [0, 1, 2].map(|i| x[Self::MECHANICAL + i]);
-        Ok(Energy { kinetic, potential, dissipated, supplied, port })
+        Ok(Energy {
+            kinetic,
+            potential,
+            dissipated,
+            supplied,
+            port,
+        })
     }
 }
 
 /// Length of a vector, smooth enough at zero for dual numbers.
 fn magnitude<S: Scalar, const D: usize>(v: &Vector<S, D>) -> S {
     let squared = v.dot(v);
-    if squared.re().vanishes() { S::lift(0.0) } else { squared.sqrt() }
+    if squared.re().vanishes() {
+        S::lift(0.0)
+    } else {
+        squared.sqrt()
+    }
 }

@@ -68,6 +68,7 @@ pub enum StabilisationKind {
 }
 
 /// Parameters of the double wishbone.
+#[allow(clippy::struct_excessive_bools, reason = "each leaves out a part of its own")]
 #[derive(Debug, Clone, PartialEq, Variables)]
 #[variables(parameter)]
 pub struct Parameters {

@@ -5,7 +5,7 @@ use model::{EvaluationError, ParameterError};
 
 use super::coordinates::{ArmCoordinates, CarrierCoordinates};
 use super::variables::Motion;
-use super::wishbone::{Closing, Loads, Wishbone};
+use super::wishbone::{Closing, KinematicsOf, Loads, OpenLoop, Wishbone};
 
 /// Largest step of the lower angle on the way from the design position [rad]
 const CONTINUATION_STEP: f64 = 0.05;
@@ -61,7 +61,11 @@ where
         self.design_states(x);
         let (phi, from) = self.design_lower;
         let way = given.lower_theta - from;
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small count")]
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a small count"
+        )]
         let steps = (way.abs() / CONTINUATION_STEP).ceil().clamp(1.0, 1e4) as u32;
         for i in 1..=steps {
             let theta = from + way * f64::from(i) / f64::from(steps);
@@ -97,26 +101,35 @@ where
     fn correct_free(&self, x: &mut [f64], gap: &Vector<f64, D>, rates: bool) -> Result<(), EvaluationError> {
         let k = self.kinematics(x)?;
         let G: Matrix<f64, D, D> = k.C.J * k.C.J.transpose() + k.far.J * k.far.J.transpose();
-        let F = close(&G, &-gap)?.F;
-        self.displace(x, &(Vector::zeros(), k.C.J.transpose() * F, -(k.far.J.transpose() * F)), rates);
+        let F = close(&G, &-gap)?;
+        self.displace(
+            x,
+            &(Vector::zeros(), k.C.J.transpose() * F, -(k.far.J.transpose() * F)),
+            rates,
+        );
         Ok(())
     }
 
     /// Bring the states back on the loop and every orientation on its manifold (20).
+    ///
+    /// Two Newton passes on positions with the mobility of the first one, one exact solve for the rates.
     pub(super) fn project_states(&self, x: &mut [f64]) -> Result<bool, EvaluationError> {
         let mut changed = false;
         if let Closing::Projection = self.closing {
-            for _ in 0..2 {
-                let k = self.kinematics(x)?;
-                if k.gap.norm() <= ROUNDING {
-                    break;
+            let mut k = self.kinematics(x)?;
+            if k.gap.norm() > ROUNDING {
+                let open = self.unloaded(&k)?;
+                for _ in 0..2 {
+                    self.correct(x, &open, &k.gap, false)?;
+                    k = self.kinematics(x)?;
+                    if k.gap.norm() <= ROUNDING {
+                        break;
+                    }
                 }
-                self.correct(x, false)?;
                 changed = true;
             }
-            let k = self.kinematics(x)?;
             if k.gap_rate.norm() > ROUNDING {
-                self.correct(x, true)?;
+                self.correct(x, &self.unloaded(&k)?, &k.gap_rate, true)?;
                 changed = true;
             }
         }
@@ -124,13 +137,31 @@ where
         Ok(self.carrier_joint.normalise(&mut rest[..C::STATES]) | changed)
     }
 
-    /// One mass-weighted correction of gap or gap rate.
-    fn correct(&self, x: &mut [f64], rates: bool) -> Result<(), EvaluationError> {
-        let k = self.kinematics(x)?;
-        let nothing = Loads { port: None, internal: None, field: None };
-        let open = self.open(&k, &nothing, None)?;
-        let off = if rates { k.gap_rate } else { k.gap };
-        let F = close(&open.mobility(), &-off)?.F;
+    /// The two chains without any load.
+    fn unloaded(
+        &self,
+        k: &KinematicsOf<f64, D, NA, NC, A, C>,
+    ) -> Result<OpenLoop<f64, D, NA, NC>, EvaluationError> {
+        self.open(
+            k,
+            &Loads {
+                port: None,
+                internal: None,
+                field: None,
+            },
+            None,
+        )
+    }
+
+    /// One mass-weighted correction of the gap (`rates`: of the gap rate).
+    fn correct(
+        &self,
+        x: &mut [f64],
+        open: &OpenLoop<f64, D, NA, NC>,
+        gap: &Vector<f64, D>,
+        rates: bool,
+    ) -> Result<(), EvaluationError> {
+        let F = close(&open.mobility(), &-gap)?;
         self.displace(x, &open.response(&F), rates);
         Ok(())
     }
@@ -139,7 +170,11 @@ where
     pub(super) fn static_preload(&self, static_load: &Vector<f64, D>) -> Result<f64, EvaluationError> {
         let mut x = [0.0; 32];
         self.design_states(&mut x);
-        let loads = Loads { port: None, internal: Some(*static_load), field: self.gravity };
+        let loads = Loads {
+            port: None,
+            internal: Some(*static_load),
+            field: self.gravity,
+        };
         let acceleration = |F_pre: f64| -> Result<f64, EvaluationError> {
             let mut trial = *self;
             trial.strut.F_pre = F_pre;

@@ -11,8 +11,8 @@
 //! `-m a_ch` beside its weight.
 
 use mechanics::{
-    Chain, Closure, Dim, Force, Hinged, Load, Matrix, Point, Pose, Rigid, Scalar, Space, SpringDamper,
-    SpringState, Tip, Vector, close,
+    Chain, Dim, Force, Hinged, Load, Matrix, Point, Pose, Rigid, Scalar, Space, SpringDamper, SpringState,
+    Tip, Vector, close,
 };
 use model::EvaluationError;
 
@@ -24,7 +24,11 @@ use super::variables::Inputs;
 const SHORTEST: f64 = 1e-9;
 
 fn vanishes<S: Scalar, const D: usize>(quantity: &'static str, r: &Vector<S, D>) -> EvaluationError {
-    EvaluationError::Vanishes { quantity, value: r.map(S::re).norm(), limit: SHORTEST }
+    EvaluationError::Vanishes {
+        quantity,
+        value: r.map(S::re).norm(),
+        limit: SHORTEST,
+    }
 }
 
 /// How the loop is closed.
@@ -110,8 +114,8 @@ pub(super) struct Accelerations<S, const D: usize, const NA: usize, const NC: us
     /// On the lower link by the carrier, on the carrier by the upper link
     pub(super) F_B: Vector<S, D>,
     pub(super) F_C: Vector<S, D>,
-    pub(super) rank: usize,
-    pub(super) condition: S,
+    /// Y1 + Y2 of the closure (18); `None` with a bushing
+    pub(super) closure: Option<Matrix<S, D, D>>,
 }
 
 /// Loads at P and on the bodies.
@@ -171,12 +175,19 @@ where
 
     /// Positions and velocities.
     #[inline]
-    pub(super) fn kinematics<S: Scalar>(&self, x: &[S]) -> Result<KinematicsOf<S, D, NA, NC, A, C>, EvaluationError> {
+    pub(super) fn kinematics<S: Scalar>(
+        &self,
+        x: &[S],
+    ) -> Result<KinematicsOf<S, D, NA, NC, A, C>, EvaluationError> {
         let (lower, carrier, upper) = Self::split(x);
         let lower = self.lower_joint.pose(lower);
         let carrier = self.carrier_joint.pose(carrier);
         let upper = self.upper_joint.pose(upper);
-        let (B, C, P) = (lower.point(&self.r_AB), carrier.point(&self.r_BC), carrier.point(&self.r_BP));
+        let (B, C, P) = (
+            lower.point(&self.r_AB),
+            carrier.point(&self.r_BC),
+            carrier.point(&self.r_BP),
+        );
         let r_B = self.r_A.map(S::lift) + B.r;
         let (r_C1, v_C1) = (r_B + C.r, B.v + C.v);
         let r_D = self.r_D.map(S::lift);
@@ -186,28 +197,55 @@ where
             ((r_C1, v_C1), end, foot, r_C1 + end.r - r_D, v_C1 + end.v)
         } else {
             let (end, foot) = (upper.point(&self.r_DC), upper.point(&self.r_DS));
-            ((r_D, Vector::zeros()), end, foot, r_C1 - (r_D + end.r), v_C1 - end.v)
+            (
+                (r_D, Vector::zeros()),
+                end,
+                foot,
+                r_C1 - (r_D + end.r),
+                v_C1 - end.v,
+            )
         };
         let r_T = self.r_T.map(S::lift);
         let r_ST = r_T - (root.0 + foot.r);
-        let strut = self.strut.state(&r_ST, &-(root.1 + foot.v)).ok_or_else(|| vanishes("strut length", &r_ST))?;
+        let strut = self
+            .strut
+            .state(&r_ST, &-(root.1 + foot.v))
+            .ok_or_else(|| vanishes("strut length", &r_ST))?;
         let tie = match self.tie {
             None => None,
             Some(tie) => {
                 let R = carrier.point(&self.r_BR);
                 let r_RT = self.r_tie.map(S::lift) - (r_B + R.r);
-                let state = tie.state(&r_RT, &-(B.v + R.v)).ok_or_else(|| vanishes("tie rod length", &r_RT))?;
+                let state = tie
+                    .state(&r_RT, &-(B.v + R.v))
+                    .ok_or_else(|| vanishes("tie rod length", &r_RT))?;
                 Some((R, state))
             }
         };
-        Ok(Kinematics { lower, carrier, upper, B, C, P, far, foot, root, r_B, gap, gap_rate, strut, tie })
+        Ok(Kinematics {
+            lower,
+            carrier,
+            upper,
+            B,
+            C,
+            P,
+            far,
+            foot,
+            root,
+            r_B,
+            gap,
+            gap_rate,
+            strut,
+            tie,
+        })
     }
 
     /// Loads from inputs and time.
     #[inline]
     pub(super) fn loads<S: Scalar>(&self, t: S, u: &Inputs<S>, pulse: PulsePhase) -> Loads<S, D> {
         let F = Dim::<D>::restrict(&(u.P.F + u.P_2.F));
-        let inertia = |m: &model::SymmetricTensor<S>| Dim::<D>::restrict_tensor(m.xx, m.xy, m.xz, m.yy, m.yz, m.zz);
+        let inertia =
+            |m: &model::SymmetricTensor<S>| Dim::<D>::restrict_tensor(m.xx, m.xy, m.xz, m.yy, m.yz, m.zz);
         let M = (!u.P.M.vanishes() || !u.P_2.M.vanishes()).then(|| inertia(&u.P.M) + inertia(&u.P_2.M));
         let port = (M.is_some() || !F.iter().all(|f| f.vanishes())).then_some(Load { F, M });
         let a_ch = Dim::<D>::restrict(&u.chassis_a);
@@ -216,7 +254,11 @@ where
             Some(g) => Some(g.map(S::lift) - a_ch),
             None => moving.then_some(-a_ch),
         };
-        Loads { port, internal: self.load.map(|law| law.force(t, pulse)), field }
+        Loads {
+            port,
+            internal: self.load.map(|law| law.force(t, pulse)),
+            field,
+        }
     }
 
     /// Lower link and carrier under their loads; `at_C`: what hangs at C.
@@ -239,8 +281,10 @@ where
             tie,
             at_C.map(|l| (&k.C, l)),
         ];
-        let hinged = Hinged::new(&carrier, carrier_loads)
-            .map_err(|source| EvaluationError::Inertia { element: "carrier", source })?;
+        let hinged = Hinged::new(&carrier, carrier_loads).map_err(|source| EvaluationError::Inertia {
+            element: "carrier",
+            source,
+        })?;
         Ok((lower, hinged))
     }
 
@@ -254,12 +298,22 @@ where
     ) -> Result<OpenLoop<S, D, NA, NC>, EvaluationError> {
         let (body, carrier) = self.inner(k, loads, None)?;
         let weight = loads.field.map(|g| (&body.com, Force::load(g * body.m)));
-        let lower = Hinged::new(&body, [weight])
-            .map_err(|source| EvaluationError::Inertia { element: "lower link", source })?;
+        let lower = Hinged::new(&body, [weight]).map_err(|source| EvaluationError::Inertia {
+            element: "lower link",
+            source,
+        })?;
         let upper = self.hang_upper(k, loads, strut_force, None)?;
         let (lower_tip, carrier_tip, upper_tip) = (lower.tip(&k.B), carrier.tip(&k.C), upper.tip(&k.far));
         let chain = Chain::new(&lower_tip, &carrier, &carrier_tip);
-        Ok(OpenLoop { lower, lower_tip, carrier, carrier_tip, upper, upper_tip, chain })
+        Ok(OpenLoop {
+            lower,
+            lower_tip,
+            carrier,
+            carrier_tip,
+            upper,
+            upper_tip,
+            chain,
+        })
     }
 
     /// The upper link under weight, strut and, with a bushing, the bushing's force at D.
@@ -271,14 +325,24 @@ where
         strut_force: Option<Vector<S, D>>,
         at_D: Option<Vector<S, D>>,
     ) -> Result<Hinged<S, D, NA>, EvaluationError> {
-        let rigid = if at_D.is_some() { Rigid { c: self.upper.c - self.r_DC, ..self.upper } } else { self.upper };
+        let rigid = if at_D.is_some() {
+            Rigid {
+                c: self.upper.c - self.r_DC,
+                ..self.upper
+            }
+        } else {
+            self.upper
+        };
         let body = k.upper.body(&rigid);
         let upper_loads = [
             loads.field.map(|g| (&body.com, Force::load(g * body.m))),
             strut_force.map(|F| (&k.foot, Force::load(F))),
             at_D.map(|F| (&k.far, Force::load(F))),
         ];
-        Hinged::new(&body, upper_loads).map_err(|source| EvaluationError::Inertia { element: "upper link", source })
+        Hinged::new(&body, upper_loads).map_err(|source| EvaluationError::Inertia {
+            element: "upper link",
+            source,
+        })
     }
 
     /// Accelerations and forces under the given loads.
@@ -290,14 +354,20 @@ where
     ) -> Result<Accelerations<S, D, NA, NC>, EvaluationError> {
         let strut_force = Some(k.strut.e * k.strut.F_s);
         if let Some((stiffness, damping)) = self.bushing() {
-            return self.accelerate_chain(k, loads, strut_force, -k.gap * S::lift(stiffness) - k.gap_rate * S::lift(damping));
+            return self.accelerate_chain(
+                k,
+                loads,
+                strut_force,
+                -k.gap * S::lift(stiffness) - k.gap_rate * S::lift(damping),
+            );
         }
         let o = self.open(k, loads, strut_force)?;
         let mut rhs = o.upper_tip.b - o.chain.b; // (18)
         if let Closing::Baumgarte { a, b } = self.closing {
             rhs -= k.gap_rate * S::lift(2.0 * a) + k.gap * S::lift(b * b); // (19)
         }
-        let Closure { F, rank, condition } = close(&(o.chain.Y + o.upper_tip.Y), &rhs)?;
+        let closure = o.mobility();
+        let F = close(&closure, &rhs)?;
         let a_B = o.chain.joint_acceleration(&F);
         let F_B = o.chain.joint_force(&a_B, &F);
         let q_carrier = o.carrier.q0 - o.carrier.Kq * a_B + o.carrier_tip.Rq * F; // (6)
@@ -312,8 +382,7 @@ where
             F_D: o.upper.f - o.upper_tip.G * F,
             F_B,
             F_C: F,
-            rank,
-            condition,
+            closure: Some(closure),
         })
     }
 
@@ -326,11 +395,26 @@ where
         F_D: Vector<S, D>,
     ) -> Result<Accelerations<S, D, NA, NC>, EvaluationError> {
         let upper = self.hang_upper(k, loads, strut_force, Some(F_D))?;
-        let (body, carrier) = self.inner(k, loads, Some(Load { F: upper.f, M: Some(upper.M) }))?;
+        let (body, carrier) = self.inner(
+            k,
+            loads,
+            Some(Load {
+                F: upper.f,
+                M: Some(upper.M),
+            }),
+        )?;
         let weight = loads.field.map(|g| (&body.com, Force::load(g * body.m)));
-        let outer = Some((&k.B, Load { F: carrier.f, M: Some(carrier.M) }));
-        let lower = Hinged::new(&body, [weight, outer])
-            .map_err(|source| EvaluationError::Inertia { element: "lower link", source })?;
+        let outer = Some((
+            &k.B,
+            Load {
+                F: carrier.f,
+                M: Some(carrier.M),
+            },
+        ));
+        let lower = Hinged::new(&body, [weight, outer]).map_err(|source| EvaluationError::Inertia {
+            element: "lower link",
+            source,
+        })?;
         let a_B = k.B.J * lower.q0 + k.B.c;
         let q_carrier = carrier.q0 - carrier.Kq * a_B;
         let a_C = a_B + k.C.J * q_carrier + k.C.c;
@@ -345,8 +429,7 @@ where
             F_D: -F_D,
             F_B: carrier.f - carrier.M * a_B,
             F_C: upper.f - upper.M * a_C,
-            rank: 0,
-            condition: S::lift(1.0),
+            closure: None,
         })
     }
 
@@ -383,7 +466,11 @@ where
 
     /// Velocities of the centres of mass: lower, carrier, upper.
     fn com_velocities<S: Scalar>(&self, k: &KinematicsOf<S, D, NA, NC, A, C>) -> [Vector<S, D>; 3] {
-        let c_upper = if self.bushing().is_some() { self.upper.c - self.r_DC } else { self.upper.c };
+        let c_upper = if self.bushing().is_some() {
+            self.upper.c - self.r_DC
+        } else {
+            self.upper.c
+        };
         [
             k.lower.point(&self.lower.c).v,
             k.B.v + k.carrier.point(&self.carrier.c).v,
@@ -399,7 +486,10 @@ where
     /// Kinetic and potential energy (21).
     pub(super) fn energies<S: Scalar>(&self, k: &KinematicsOf<S, D, NA, NC, A, C>) -> (S, S) {
         let [lower, carrier, upper] = self.com_velocities(k);
-        let kinetic = (lower.dot(&lower) * self.lower.m + carrier.dot(&carrier) * self.carrier.m + upper.dot(&upper) * self.upper.m) * 0.5
+        let kinetic = (lower.dot(&lower) * self.lower.m
+            + carrier.dot(&carrier) * self.carrier.m
+            + upper.dot(&upper) * self.upper.m)
+            * 0.5
             + k.lower.spin_energy(&self.lower)
             + k.carrier.spin_energy(&self.carrier)
             + k.upper.spin_energy(&self.upper);
@@ -411,7 +501,11 @@ where
             potential += k.gap.dot(&k.gap) * (0.5 * stiffness);
         }
         if let Some(g) = self.gravity {
-            let c_upper = if self.bushing().is_some() { self.upper.c - self.r_DC } else { self.upper.c };
+            let c_upper = if self.bushing().is_some() {
+                self.upper.c - self.r_DC
+            } else {
+                self.upper.c
+            };
             let moment = (self.r_A.map(S::lift) + k.lower.point(&self.lower.c).r) * S::lift(self.lower.m)
                 + (k.r_B + k.carrier.point(&self.carrier.c).r) * S::lift(self.carrier.m)
                 + (k.root.0 + k.upper.point(&c_upper).r) * S::lift(self.upper.m);
