@@ -34,8 +34,7 @@ pub fn variables(input: TokenStream) -> TokenStream {
         .into()
 }
 
-/// Implement `model::Variables<f64>` and `From<i64>`-like access for a field-less enum whose items
-/// count from 1; item names are the variants in `snake_case`.
+/// Implement `model::Variables<f64>` for a field-less enum whose items count from 1; item names are the variants in `snake_case`.
 #[proc_macro_derive(Enumeration)]
 pub fn enumeration(input: TokenStream) -> TokenStream {
     let input = parse_macro_input!(input as DeriveInput);
@@ -189,45 +188,47 @@ fn struct_causality(attrs: &[Attribute]) -> syn::Result<&'static str> {
     Ok(causality)
 }
 
-fn expand_variables(input: &DeriveInput) -> syn::Result<Tokens> {
-    let name = &input.ident;
-    let Data::Struct(data) = &input.data else {
-        return Err(syn::Error::new(name.span(), "Variables is derived for structs"));
+/// What one field contributes to the expansion.
+struct FieldTokens {
+    length: Tokens,
+    fill: Tokens,
+    load: Tokens,
+    store: Tokens,
+}
+
+fn field_tokens(
+    field: &Field,
+    scalar: Option<&syn::Ident>,
+    number_type: &Tokens,
+    causality: &str,
+) -> syn::Result<FieldTokens> {
+    let ident = field
+        .ident
+        .as_ref()
+        .ok_or_else(|| syn::Error::new(field.span(), "name"))?;
+    let a = field_attributes(field)?;
+    let ty = &field.ty;
+    let at_f64 = concrete(quote!(#ty), scalar);
+    let table = quote!(<#at_f64 as ::model::Variables<f64>>::TABLE);
+    let (description, unit) = documentation(&field.attrs);
+    let unit = a.unit.or(unit).unwrap_or_default();
+    let unit = if unit == "1" || unit == "-" {
+        String::new()
+    } else {
+        unit
     };
-    let Fields::Named(fields) = &data.fields else {
-        return Err(syn::Error::new(name.span(), "fields need names"));
-    };
-    let scalar = input.generics.type_params().next().map(|p| p.ident.clone());
-    let causality = struct_causality(&input.attrs)?;
-    let (mut lengths, mut fills, mut loads, mut stores) = (vec![], vec![], vec![], vec![]);
-    let number_type = scalar.as_ref().map_or_else(|| quote!(f64), |s| quote!(#s));
-    for field in &fields.named {
-        let ident = field
-            .ident
-            .as_ref()
-            .ok_or_else(|| syn::Error::new(field.span(), "name"))?;
-        let a = field_attributes(field)?;
-        let ty = &field.ty;
-        let at_f64 = concrete(quote!(#ty), scalar.as_ref());
-        let table = quote!(<#at_f64 as ::model::Variables<f64>>::TABLE);
-        let (description, unit) = documentation(&field.attrs);
-        let unit = a.unit.or(unit).unwrap_or_default();
-        let unit = if unit == "1" || unit == "-" {
-            String::new()
-        } else {
-            unit
-        };
-        let (prefix, start, depends, tunable, discrete) =
-            (&a.prefix, &a.start, &a.depends, a.tunable, a.discrete);
-        let field_causality = format_ident!("{}", if a.local { "Local" } else { causality });
-        let initial = format_ident!("{}", a.initial.unwrap_or("Calculated"));
-        let (min, max, nominal) = (
-            option(a.min.as_ref()),
-            option(a.max.as_ref()),
-            option(a.nominal.as_ref()),
-        );
-        lengths.push(quote!(#table.len()));
-        fills.push(quote! {
+    let (prefix, start, depends, tunable, discrete) =
+        (&a.prefix, &a.start, &a.depends, a.tunable, a.discrete);
+    let field_causality = format_ident!("{}", if a.local { "Local" } else { causality });
+    let initial = format_ident!("{}", a.initial.unwrap_or("Calculated"));
+    let (min, max, nominal) = (
+        option(a.min.as_ref()),
+        option(a.max.as_ref()),
+        option(a.nominal.as_ref()),
+    );
+    Ok(FieldTokens {
+        length: quote!(#table.len()),
+        fill: quote! {
             table = ::model::fill(table, at, #table, &::model::Attributes {
                 prefix: #prefix,
                 description: #description,
@@ -243,15 +244,36 @@ fn expand_variables(input: &DeriveInput) -> syn::Result<Tokens> {
                 depends: &[#(#depends),*],
             });
             at += #table.len();
-        });
-        loads.push(quote! {
+        },
+        load: quote! {
             let #ident = <#ty as ::model::Variables<#number_type>>::load(&values[at..]);
             at += #table.len();
-        });
-        stores.push(quote! {
+        },
+        store: quote! {
             ::model::Variables::<#number_type>::store(&self.#ident, &mut values[at..]);
             at += #table.len();
-        });
+        },
+    })
+}
+
+fn expand_variables(input: &DeriveInput) -> syn::Result<Tokens> {
+    let name = &input.ident;
+    let Data::Struct(data) = &input.data else {
+        return Err(syn::Error::new(name.span(), "Variables is derived for structs"));
+    };
+    let Fields::Named(fields) = &data.fields else {
+        return Err(syn::Error::new(name.span(), "fields need names"));
+    };
+    let scalar = input.generics.type_params().next().map(|p| p.ident.clone());
+    let causality = struct_causality(&input.attrs)?;
+    let number_type = scalar.as_ref().map_or_else(|| quote!(f64), |s| quote!(#s));
+    let (mut lengths, mut fills, mut loads, mut stores) = (vec![], vec![], vec![], vec![]);
+    for field in &fields.named {
+        let tokens = field_tokens(field, scalar.as_ref(), &number_type, causality)?;
+        lengths.push(tokens.length);
+        fills.push(tokens.fill);
+        loads.push(tokens.load);
+        stores.push(tokens.store);
     }
     let idents: Vec<_> = fields.named.iter().map(|f| &f.ident).collect();
     let (generics, target) = match &scalar {
