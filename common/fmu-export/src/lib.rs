@@ -25,3 +25,4 @@ pub use instance::{Instance, State};
 pub use package::{PackError, archive, run};
 pub use phase::{Phase, Rule};
 pub use solver::{SolverCounters, SolverMethod, SolverParameters};
+pub use table::{Table, Variable};

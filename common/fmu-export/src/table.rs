@@ -57,14 +57,16 @@ pub(crate) const TIME: Entry = {
 
 /// A variable of the FMU.
 #[derive(Debug, Clone)]
-pub(crate) struct Variable {
-    pub(crate) name: String,
-    pub(crate) entry: Entry,
+pub struct Variable {
+    /// Full name
+    pub name: String,
+    /// Everything else
+    pub entry: Entry,
 }
 
 /// The list with names, and per variable what Get has to know.
 #[derive(Debug, Clone)]
-pub(crate) struct Table {
+pub struct Table {
     pub(crate) variables: Vec<Variable>,
     /// Bit i: the variable belongs to output group i; [`FLOAT`]: its type is Float64
     pub(crate) access: Vec<u8>,
@@ -74,7 +76,9 @@ pub(crate) struct Table {
 pub(crate) const FLOAT: u8 = 0x80;
 
 impl Table {
-    pub(crate) fn new<M: Model>() -> Self {
+    /// The variables of the model `M`.
+    #[must_use]
+    pub fn new<M: Model>() -> Self {
         let mut variables = Vec::with_capacity(Layout::<M>::COUNT);
         for section in Layout::<M>::SECTIONS {
             variables.extend(section.iter().map(|entry| Variable {
@@ -92,6 +96,12 @@ impl Table {
             }
         }
         Self { variables, access }
+    }
+
+    /// The variables in the order of their value references.
+    #[must_use]
+    pub fn variables(&self) -> &[Variable] {
+        &self.variables
     }
 
     /// Start values of all variables.

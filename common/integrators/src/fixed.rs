@@ -3,18 +3,15 @@
 use crate::error::all_finite;
 use crate::one_step::{OneStep, Start};
 use crate::run::{MAX_STEPS, Run, Taken, Watch};
-use crate::{Ode, StepError};
+use crate::{Ode, Settings, StepError};
 
-/// Relative excess of the interval over a whole number of steps that is taken for rounding.
-const SLACK: f64 = 1e-9;
-
-/// Runs to `t_end` in `n = max(1, ceil(H/step - 1e-9))` steps of `H/n`.
+/// Runs to `t_end` in `n` equal steps, see [`Settings::inner_steps`].
 ///
 /// Times are `t_0 + i h`, not a running sum, and the last is `t_end` itself.
 #[inline]
 pub(crate) fn fixed<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
     method: &M,
-    step: f64,
+    settings: &Settings,
     ode: &O,
     run: &mut Run<N>,
     t_end: f64,
@@ -22,12 +19,12 @@ pub(crate) fn fixed<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
 ) -> Result<(), StepError<O::Error>> {
     let t_start = run.t;
     let span = t_end - t_start;
-    let steps = (span / step - SLACK).ceil().max(1.0);
+    let steps = settings.inner_steps(span);
     if steps > f64::from(MAX_STEPS) {
         return Err(StepError::TooManySteps {
             t: t_start,
             t_end,
-            h: step,
+            h: settings.step,
         });
     }
     #[allow(

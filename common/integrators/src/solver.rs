@@ -152,10 +152,9 @@ impl Solver {
             statistics: *statistics,
         };
         let mut memory = self.memory;
-        let step = self.settings.step;
         match self.settings.method {
-            Method::Heun => fixed(&HEUN, step, ode, &mut run, t_end, watch)?,
-            Method::Rk4 => fixed(&RK4, step, ode, &mut run, t_end, watch)?,
+            Method::Heun => fixed(&HEUN, &self.settings, ode, &mut run, t_end, watch)?,
+            Method::Rk4 => fixed(&RK4, &self.settings, ode, &mut run, t_end, watch)?,
             Method::Dopri5 => adaptive(&DOPRI5, &self.settings, &mut memory, ode, &mut run, t_end, watch)?,
         }
         *x = run.x;

@@ -1,8 +1,9 @@
 //! Runs an FMI 3.0 co-simulation FMU and times its step loop, without an interpreter in between.
 //!
-//! One job as JSON on standard input (or in the file given as argument), one answer as JSON on standard output; exit code 1
-//! and `{"status", "function", "time", "messages"}` when something failed. The fields are those of [`job::Job`] and
-//! [`answer`]. Only the loop of `fmi3DoStep` is timed: loading, initialisation and recording are outside.
+//! One job as JSON on standard input (or in the file given as argument), one answer as JSON on standard output;
+//! exit code 1 and `{"status", "function", "time", "messages"}` when something failed. The fields are those of
+//! [`job::Job`] and [`answer`]. Only the loop of `fmi3DoStep` is timed: loading, initialisation and recording are
+//! outside.
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "units stand in brackets")]
 
