@@ -36,6 +36,14 @@ pub struct Point<S, const D: usize, const N: usize> {
     pub c: Vector<S, D>,
 }
 
+impl<S: Scalar, const D: usize, const N: usize> Point<S, D, N> {
+    /// The joint itself.
+    #[must_use]
+    pub fn zero() -> Self {
+        Self { r: Vector::zeros(), v: Vector::zeros(), J: Matrix::zeros(), c: Vector::zeros() }
+    }
+}
+
 /// Inertia of an element about its joint.
 #[derive(Debug, Clone, Copy)]
 pub struct Body<S, const D: usize, const N: usize> {
@@ -58,15 +66,11 @@ pub struct Load<S, const D: usize> {
     pub M: Option<Matrix<S, D, D>>,
 }
 
-/// A load without inertia.
-#[derive(Debug, Clone, Copy)]
-pub struct Force;
-
-impl Force {
-    /// The load of a pure force.
+impl<S, const D: usize> Load<S, D> {
+    /// A force without inertia.
     #[inline]
-    pub fn load<S, const D: usize>(F: Vector<S, D>) -> Load<S, D> {
-        Load { F, M: None }
+    pub fn force(F: Vector<S, D>) -> Self {
+        Self { F, M: None }
     }
 }
 
@@ -75,6 +79,76 @@ impl Force {
 #[error("the inertia of the element about its joint is not positive definite")]
 pub struct NotPositiveDefinite;
 
+/// An element under construction: the loads are added one by one.
+#[derive(Debug, Clone, Copy)]
+pub struct Loaded<S, const D: usize, const N: usize> {
+    Mq: Matrix<S, N, N>,
+    Q0: Vector<S, N>,
+    K: Matrix<S, N, D>,
+    M: Matrix<S, D, D>,
+    f: Vector<S, D>,
+}
+
+impl<S: Scalar, const D: usize, const N: usize> Loaded<S, D, N> {
+    /// The element alone.
+    #[inline]
+    pub fn new(body: &Body<S, D, N>) -> Self {
+        let Body { m, com, .. } = body;
+        Self {
+            Mq: body.Mq,
+            Q0: body.Q,
+            K: com.J.transpose() * *m,
+            M: Matrix::<S, D, D>::from_diagonal_element(*m),
+            f: -com.c * *m,
+        }
+    }
+
+    /// Add a load at the body point `p` (12a).
+    #[inline]
+    pub fn add(&mut self, p: &Point<S, D, N>, load: &Load<S, D>) {
+        let mut F = load.F;
+        if let Some(M_k) = &load.M {
+            let JtM = p.J.transpose() * M_k;
+            self.Mq += JtM * p.J;
+            self.K += JtM;
+            self.M += M_k;
+            F -= M_k * p.c;
+        }
+        self.Q0 += p.J.transpose() * F;
+        self.f += F;
+    }
+
+    /// Add a generalised force, such as that of a drive torque.
+    #[inline]
+    pub fn drive(&mut self, Q: &Vector<S, N>) {
+        self.Q0 += Q;
+    }
+
+    /// The element with all its loads, seen from its root (12b).
+    ///
+    /// # Errors
+    /// [`NotPositiveDefinite`] if the generalised inertia has no Cholesky factor.
+    #[inline]
+    pub fn hinge(&self) -> Result<Hinged<S, D, N>, NotPositiveDefinite> {
+        Ok(self.with_inverse(inverse_positive_definite(&self.Mq)?))
+    }
+
+    /// The element with its coordinates held, as if its inertia about the joint were infinite.
+    #[inline]
+    pub fn hold(&self) -> Hinged<S, D, N> {
+        self.with_inverse(Matrix::<S, N, N>::zeros())
+    }
+
+    #[inline]
+    fn with_inverse(&self, inverse: Matrix<S, N, N>) -> Hinged<S, D, N> {
+        let Self { K, M, f, Q0, .. } = self;
+        let Kq = inverse * K;
+        let q0 = inverse * Q0; // (6) at a_A = 0
+        let Kt = K.transpose();
+        Hinged { M: M - Kt * Kq, f: f - Kt * q0, q0, Kq, inverse }
+    }
+}
+
 /// An element with its loads, seen from its root.
 #[derive(Debug, Clone, Copy)]
 pub struct Hinged<S, const D: usize, const N: usize> {
@@ -82,25 +156,56 @@ pub struct Hinged<S, const D: usize, const N: usize> {
     pub M: Matrix<S, D, D>,
     /// Force on the leader at a_A = 0, f = A.F0 [N]
     pub f: Vector<S, D>,
-    /// q'' at a_A = 0 and F_B = 0
+    /// q'' at a_A = 0
     pub q0: Vector<S, N>,
     /// Mq^-1 K: q'' falls by this times a_A
     pub Kq: Matrix<S, N, D>,
-    K: Matrix<S, N, D>,
     inverse: Matrix<S, N, N>,
 }
 
-/// The tip of an element, where an unknown force F_B acts.
+/// The change of an element by further forces.
 #[derive(Debug, Clone, Copy)]
-pub struct Tip<S, const D: usize, const N: usize> {
-    /// Force transmission tip to root
-    pub G: Matrix<S, D, D>,
-    /// Mobility at the tip, symmetric [1/kg]
-    pub Y: Matrix<S, D, D>,
-    /// Tip acceleration at a_A = 0 and F_B = 0 [m/s2]
-    pub b: Vector<S, D>,
-    /// Mq^-1 J_B^T: q'' rises by this times F_B
-    pub Rq: Matrix<S, N, D>,
+pub struct Answer<S, const D: usize, const N: usize, const R: usize> {
+    /// Generalised force
+    pub generalised: Matrix<S, N, R>,
+    /// q'' at a_A = 0
+    pub q: Matrix<S, N, R>,
+    /// Force on the leader [N]
+    pub f: Matrix<S, D, R>,
+}
+
+impl<S: Scalar, const D: usize, const N: usize> Hinged<S, D, N> {
+    /// What further forces `F` at `p` change, several at once as columns: the generalised force, q''
+    /// at a_A = 0, and the force on the leader (12c).
+    #[inline]
+    pub fn answer<const R: usize>(&self, p: &Point<S, D, N>, F: &Matrix<S, D, R>) -> Answer<S, D, N, R> {
+        let generalised = p.J.transpose() * F;
+        Answer { q: self.inverse * generalised, f: F - self.Kq.transpose() * generalised, generalised }
+    }
+
+    /// No element at all, to be overwritten.
+    #[inline]
+    pub(crate) fn zero() -> Self {
+        Self {
+            M: Matrix::zeros(),
+            f: Vector::zeros(),
+            q0: Vector::zeros(),
+            Kq: Matrix::zeros(),
+            inverse: Matrix::zeros(),
+        }
+    }
+
+    /// q'' under the root acceleration `a_A` (6).
+    #[inline]
+    pub fn acceleration(&self, a_A: &Vector<S, D>) -> Vector<S, N> {
+        self.q0 - self.Kq * a_A
+    }
+
+    /// Force on the leader (10).
+    #[inline]
+    pub fn root_force(&self, a_A: &Vector<S, D>) -> Vector<S, D> {
+        self.f - self.M * a_A
+    }
 }
 
 /// By Cholesky's factors; a single degree of freedom needs neither root nor factor.
@@ -113,58 +218,4 @@ fn inverse_positive_definite<S: Scalar, const N: usize>(
         return positive.then(|| Mq.map(S::recip)).ok_or(NotPositiveDefinite);
     }
     Ok(Mq.cholesky().ok_or(NotPositiveDefinite)?.inverse())
-}
-
-impl<S: Scalar, const D: usize, const N: usize> Hinged<S, D, N> {
-    /// The element `body` with known `loads` at body points (12a), (12b); `None`: not there.
-    ///
-    /// # Errors
-    /// [`NotPositiveDefinite`] if the generalised inertia has no Cholesky factor.
-    #[inline]
-    pub fn new<const L: usize>(
-        body: &Body<S, D, N>,
-        loads: [Option<(&Point<S, D, N>, Load<S, D>)>; L],
-    ) -> Result<Self, NotPositiveDefinite> {
-        let Body { m, com, .. } = body;
-        let mut Mq = body.Mq;
-        let mut Q0 = body.Q;
-        let mut K = com.J.transpose() * *m;
-        let mut M = Matrix::<S, D, D>::from_diagonal_element(*m);
-        let mut f = -com.c * *m;
-        for (p, load) in loads.into_iter().flatten() {
-            let mut F = load.F;
-            if let Some(M_k) = &load.M {
-                let JtM = p.J.transpose() * M_k;
-                Mq += JtM * p.J;
-                K += JtM;
-                M += M_k;
-                F -= M_k * p.c;
-            }
-            Q0 += p.J.transpose() * F;
-            f += F;
-        }
-        let inverse = inverse_positive_definite(&Mq)?;
-        let Kq = inverse * K;
-        let q0 = inverse * Q0; // (6) at a_A = 0
-        M -= K.transpose() * Kq; // (12b)
-        f -= K.transpose() * q0;
-        Ok(Self {
-            M,
-            f,
-            q0,
-            Kq,
-            K,
-            inverse,
-        })
-    }
-
-    /// The two-port columns of the tip `p` (12c).
-    #[inline]
-    pub fn tip(&self, p: &Point<S, D, N>) -> Tip<S, D, N> {
-        let Rq = self.inverse * p.J.transpose();
-        let G = Matrix::<S, D, D>::identity() - self.K.transpose() * Rq;
-        let Y = p.J * Rq;
-        let b = p.J * self.q0 + p.c;
-        Tip { G, Y, b, Rq }
-    }
 }

@@ -19,20 +19,27 @@
     reason = "fields and locals carry the paper's symbols: F, M, G, Y, R"
 )]
 
-pub mod chain;
+pub mod assembly;
 pub mod closure;
+pub mod drift;
 pub mod element;
 pub mod joint;
 pub mod scalar;
 pub mod space;
+pub mod spatial;
 pub mod spring;
 
-pub use chain::Chain;
-pub use closure::{Conditioning, InconsistentClosure, close, conditioning};
-pub use element::{Body, Force, Hinged, Load, NotPositiveDefinite, Point, Tip};
-pub use joint::{Joint, Planar, Pose, Revolute, Rigid, Spherical, Universal};
+pub use assembly::{
+    Accelerations, Assembly, AssemblyError, Baumgarte, ClosingJoint, Gap, Kinematics, KinematicsOf, Member, Parent,
+    Place, Tree,
+};
+pub use closure::{Band, Conditioning, InconsistentClosure, close, conditioning};
+pub use drift::NotClosed;
+pub use element::{Answer, Body, Hinged, Load, Loaded, NotPositiveDefinite, Point};
+pub use joint::{Joint, Planar, Pose, Rigid};
 pub use scalar::Scalar;
 pub use space::{Dim, Space};
+pub use spatial::{Spatial, SpatialPose};
 pub use spring::{SpringDamper, SpringState};
 
 /// Vector of the space of dimension `D`.

@@ -35,9 +35,12 @@ pub struct SpringState<S, const D: usize> {
 }
 
 impl SpringDamper {
+    /// Shortest usable length [m]: below it the direction is lost.
+    pub const SHORTEST: f64 = 1e-9;
+
     /// Length, rate and tension (15), (16); `v_ST` and `r_ST` are T relative to S.
     ///
-    /// `None` where the length is at most 1e-9 m: the direction is lost.
+    /// `None` where the length is at most [`Self::SHORTEST`].
     #[inline]
     pub fn state<S: Scalar, const D: usize>(
         &self,
@@ -45,7 +48,7 @@ impl SpringDamper {
         v_ST: &Vector<S, D>,
     ) -> Option<SpringState<S, D>> {
         let l = r_ST.dot(r_ST).sqrt();
-        if l.re() <= 1e-9 {
+        if l.re() <= Self::SHORTEST {
             return None;
         }
         let e = r_ST / l;

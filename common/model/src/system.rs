@@ -64,6 +64,9 @@ pub trait Model: Clone + Sized + 'static {
     /// Take over changed tunable parameters; nothing else may change.
     fn retune(&mut self, parameters: &Self::Parameters);
 
+    /// What differs when a host integrates the states (no projection after steps).
+    fn for_model_exchange(&mut self) {}
+
     /// Cases that are allowed but probably not meant, as log messages.
     fn warnings(&self) -> Vec<String> {
         Vec::new()
@@ -174,6 +177,16 @@ pub trait System<const N: usize, const Z: usize> {
     /// See [`System::rates`].
     fn project(&self, _t: f64, _x: &mut [f64; N]) -> Result<bool, EvaluationError> {
         Ok(false)
+    }
+
+    /// How far orientations are off their manifold (unit quaternions, unit vectors).
+    fn off_manifold(&self, _x: &[f64; N]) -> f64 {
+        0.0
+    }
+
+    /// Bring orientations back on their manifold; true if they changed.
+    fn normalise(&self, _x: &mut [f64; N]) -> bool {
+        false
     }
 
     /// Functions whose sign changes are events.

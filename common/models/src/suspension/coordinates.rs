@@ -1,97 +1,68 @@
-//! What the coordinates of a joint are called, for arms and for the carrier.
+//! What the coordinates of a joint are called: as a link (angles of the axis joint - tip) and as a
+//! carrier (rotation from the design position).
 
-use mechanics::{Joint, Planar, Revolute, Scalar, Spherical, Universal};
+use mechanics::{Joint, Planar, Scalar, Spatial};
 use model::Vector3;
 
 use super::variables::{CarrierOrientation, LinkAngles};
 
-/// A joint kind that an arm can have.
-pub(super) trait ArmCoordinates<const D: usize, const N: usize>: Joint<D, N> {
-    /// Names of the states after `lower.` or `upper.`.
-    const NAMES: &'static [&'static str];
-    /// The joint of a link with this azimuth in the design position.
-    fn at_azimuth(phi: f64) -> Self;
+/// Every orientation variable; those of other joint kinds have their start values.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Orientation<S> {
+    /// Rotation from the design position about -y (carriers)
+    pub(super) psi: S,
+    pub(super) phi: S,
+    pub(super) theta: S,
+    pub(super) psi_dot: S,
+    pub(super) phi_dot: S,
+    pub(super) theta_dot: S,
+    pub(super) q: [S; 4],
+    pub(super) direction: Vector3<S>,
+    pub(super) omega: Vector3<S>,
+}
+
+impl<S: Scalar> Orientation<S> {
+    /// As the angles of a link.
+    pub(super) fn link(self) -> LinkAngles<S> {
+        let Self { theta, phi, theta_dot, phi_dot, .. } = self;
+        LinkAngles { theta, phi, theta_dot, phi_dot }
+    }
+
+    /// As the orientation of a carrier.
+    pub(super) fn carrier(self) -> CarrierOrientation<S> {
+        let Self { psi, phi, theta, psi_dot, phi_dot, theta_dot, q, omega, .. } = self;
+        CarrierOrientation { psi, phi, theta, psi_dot, phi_dot, theta_dot, q, omega }
+    }
+}
+
+/// A joint kind whose coordinates have names.
+pub(super) trait Coordinates<const D: usize, const N: usize>: Joint<D, N> {
+    /// Names of the states of a link.
+    fn link_names(&self) -> &'static [&'static str];
+    /// Names of the states of a carrier.
+    fn carrier_names(&self) -> &'static [&'static str] {
+        self.link_names()
+    }
+    /// Index of the elevation among q.
+    fn elevation(&self) -> usize;
     /// States of a resting link at these angles.
-    fn states(phi: f64, theta: f64, x: &mut [f64]);
-    /// Index of theta among the coordinates.
-    const THETA: usize;
-    fn angles<S: Scalar>(&self, x: &[S]) -> LinkAngles<S>;
-}
-
-/// A joint kind that the carrier can have.
-pub(super) trait CarrierCoordinates<const D: usize, const N: usize>: Joint<D, N> {
-    /// Names of the states after `carrier.`.
-    const NAMES: &'static [&'static str];
-    /// The joint.
-    const NEW: Self;
-    /// States of the resting carrier in the design position.
-    fn design(x: &mut [f64]);
-    fn orientation<S: Scalar>(x: &[S]) -> CarrierOrientation<S>;
-}
-
-impl ArmCoordinates<2, 1> for Planar {
-    const NAMES: &'static [&'static str] = &["angle.theta", "angle_rate.theta"];
-    const THETA: usize = 0;
-    fn at_azimuth(_: f64) -> Self {
-        Self
+    fn link_states(&self, phi: f64, theta: f64, x: &mut [f64]);
+    /// States of the resting carrier in its design position.
+    fn carrier_states(&self, x: &mut [f64]) {
+        self.link_states(0.0, 0.0, x);
     }
-    fn states(_: f64, theta: f64, x: &mut [f64]) {
-        x.copy_from_slice(&[theta, 0.0]);
-    }
-    fn angles<S: Scalar>(&self, x: &[S]) -> LinkAngles<S> {
-        let o = S::lift(0.0);
-        LinkAngles {
-            theta: x[0],
-            phi: o,
-            theta_dot: x[1],
-            phi_dot: o,
-        }
-    }
-}
-
-impl ArmCoordinates<3, 1> for Revolute {
-    const NAMES: &'static [&'static str] = &["angle.theta", "angle_rate.theta"];
-    const THETA: usize = 0;
-    fn at_azimuth(phi: f64) -> Self {
-        Self { phi }
-    }
-    fn states(_: f64, theta: f64, x: &mut [f64]) {
-        x.copy_from_slice(&[theta, 0.0]);
-    }
-    fn angles<S: Scalar>(&self, x: &[S]) -> LinkAngles<S> {
-        LinkAngles {
-            theta: x[0],
-            phi: S::lift(self.phi),
-            theta_dot: x[1],
-            phi_dot: S::lift(0.0),
-        }
-    }
-}
-
-impl ArmCoordinates<3, 2> for Universal {
-    const NAMES: &'static [&'static str] =
-        &["angle.phi", "angle.theta", "angle_rate.phi", "angle_rate.theta"];
-    const THETA: usize = 1;
-    fn at_azimuth(_: f64) -> Self {
-        Self
-    }
-    fn states(phi: f64, theta: f64, x: &mut [f64]) {
-        x.copy_from_slice(&[phi, theta, 0.0, 0.0]);
-    }
-    fn angles<S: Scalar>(&self, x: &[S]) -> LinkAngles<S> {
-        LinkAngles {
-            theta: x[1],
-            phi: x[0],
-            theta_dot: x[3],
-            phi_dot: x[2],
-        }
-    }
+    /// All orientation variables; those of other joint kinds have their start values. `carrier`: a
+    /// single angle is psi, not theta.
+    fn orientation<S: Scalar>(&self, x: &[S], carrier: bool) -> Orientation<S>;
+    /// The states from orientation variables; `carrier`: the angle is psi.
+    fn states_of(&self, o: &Orientation<f64>, x: &mut [f64], carrier: bool);
 }
 
 /// The orientation whose coordinates all keep their start values.
-fn unused<S: Scalar>() -> CarrierOrientation<S> {
+fn unused<S: Scalar>() -> Orientation<S> {
     let o = S::lift(0.0);
-    CarrierOrientation {
+    let (zero, x_axis) = (Vector3::new(o, o, o), Vector3::new(S::lift(1.0), o, o));
+    Orientation {
         psi: o,
         phi: o,
         theta: o,
@@ -99,55 +70,117 @@ fn unused<S: Scalar>() -> CarrierOrientation<S> {
         phi_dot: o,
         theta_dot: o,
         q: [S::lift(1.0), o, o, o],
-        omega: Vector3::new(o, o, o),
+        direction: x_axis,
+        omega: zero,
     }
 }
 
-impl CarrierCoordinates<2, 1> for Planar {
-    const NEW: Self = Self;
-    const NAMES: &'static [&'static str] = &["angle.psi", "angle_rate.psi"];
-    fn design(x: &mut [f64]) {
-        x.fill(0.0);
+/// One angle, of a carrier or of a link at the azimuth `phi`.
+fn single_angle<S: Scalar>(x: &[S], phi: S, carrier: bool) -> Orientation<S> {
+    if carrier {
+        Orientation { psi: x[0], psi_dot: x[1], ..unused() }
+    } else {
+        Orientation { theta: x[0], theta_dot: x[1], phi, ..unused() }
     }
-    fn orientation<S: Scalar>(x: &[S]) -> CarrierOrientation<S> {
-        CarrierOrientation {
-            psi: x[0],
-            psi_dot: x[1],
-            ..unused()
+}
+
+impl Coordinates<2, 1> for Planar {
+    fn link_names(&self) -> &'static [&'static str] {
+        &["angle.theta", "angle_rate.theta"]
+    }
+    fn carrier_names(&self) -> &'static [&'static str] {
+        &["angle.psi", "angle_rate.psi"]
+    }
+    fn elevation(&self) -> usize {
+        0
+    }
+    fn link_states(&self, _: f64, theta: f64, x: &mut [f64]) {
+        x.copy_from_slice(&[theta, 0.0]);
+    }
+    fn orientation<S: Scalar>(&self, x: &[S], carrier: bool) -> Orientation<S> {
+        single_angle(x, S::lift(0.0), carrier)
+    }
+    fn states_of(&self, o: &Orientation<f64>, x: &mut [f64], carrier: bool) {
+        let states = if carrier { [o.psi, o.psi_dot] } else { [o.theta, o.theta_dot] };
+        x.copy_from_slice(&states);
+    }
+}
+
+impl Coordinates<3, 3> for Spatial {
+    fn link_names(&self) -> &'static [&'static str] {
+        match self {
+            Self::Revolute { .. } => &["angle.theta", "angle_rate.theta"],
+            Self::Universal => &["angle.phi", "angle.theta", "angle_rate.phi", "angle_rate.theta"],
+            Self::Spherical => &[
+                "orientation.q[1]",
+                "orientation.q[2]",
+                "orientation.q[3]",
+                "orientation.q[4]",
+                "omega.x",
+                "omega.y",
+                "omega.z",
+            ],
+            Self::SphericalRod => {
+                &["direction.x", "direction.y", "direction.z", "omega.x", "omega.y", "omega.z"]
+            }
         }
     }
-}
-
-impl CarrierCoordinates<3, 2> for Universal {
-    const NEW: Self = Self;
-    const NAMES: &'static [&'static str] =
-        &["angle.phi", "angle.theta", "angle_rate.phi", "angle_rate.theta"];
-    fn design(x: &mut [f64]) {
-        x.fill(0.0);
-    }
-    fn orientation<S: Scalar>(x: &[S]) -> CarrierOrientation<S> {
-        CarrierOrientation {
-            phi: x[0],
-            theta: x[1],
-            phi_dot: x[2],
-            theta_dot: x[3],
-            ..unused()
+    fn carrier_names(&self) -> &'static [&'static str] {
+        match self {
+            Self::Revolute { .. } => &["angle.psi", "angle_rate.psi"],
+            _ => self.link_names(),
         }
     }
-}
-
-impl CarrierCoordinates<3, 3> for Spherical {
-    const NEW: Self = Self;
-    const NAMES: &'static [&'static str] = &["q[1]", "q[2]", "q[3]", "q[4]", "omega.x", "omega.y", "omega.z"];
-    fn design(x: &mut [f64]) {
-        x.fill(0.0);
-        x[0] = 1.0;
+    fn elevation(&self) -> usize {
+        usize::from(*self == Self::Universal)
     }
-    fn orientation<S: Scalar>(x: &[S]) -> CarrierOrientation<S> {
-        CarrierOrientation {
-            q: [x[0], x[1], x[2], x[3]],
-            omega: Vector3::new(x[4], x[5], x[6]),
-            ..unused()
+    fn link_states(&self, phi: f64, theta: f64, x: &mut [f64]) {
+        x.fill(0.0);
+        match self {
+            Self::Revolute { .. } => x[0] = theta,
+            Self::Universal => x[..2].copy_from_slice(&[phi, theta]),
+            Self::Spherical => {
+                // about z by phi, then about the negative y axis by theta
+                let ((sp, cp), (st, ct)) = ((0.5 * phi).sin_cos(), (0.5 * theta).sin_cos());
+                x[..4].copy_from_slice(&[cp * ct, sp * st, -cp * st, sp * ct]);
+            }
+            Self::SphericalRod => {
+                let ((sp, cp), (st, ct)) = (phi.sin_cos(), theta.sin_cos());
+                x[..3].copy_from_slice(&[ct * cp, ct * sp, st]);
+            }
+        }
+    }
+    fn orientation<S: Scalar>(&self, x: &[S], carrier: bool) -> Orientation<S> {
+        match self {
+            Self::Revolute { phi } => single_angle(x, S::lift(*phi), carrier),
+            Self::Universal => {
+                Orientation { phi: x[0], theta: x[1], phi_dot: x[2], theta_dot: x[3], ..unused() }
+            }
+            Self::Spherical => Orientation {
+                q: [x[0], x[1], x[2], x[3]],
+                omega: Vector3::new(x[4], x[5], x[6]),
+                ..unused()
+            },
+            Self::SphericalRod => Orientation {
+                direction: Vector3::new(x[0], x[1], x[2]),
+                omega: Vector3::new(x[3], x[4], x[5]),
+                ..unused()
+            },
+        }
+    }
+    fn states_of(&self, o: &Orientation<f64>, x: &mut [f64], carrier: bool) {
+        match self {
+            Self::Revolute { .. } if carrier => x.copy_from_slice(&[o.psi, o.psi_dot]),
+            Self::Revolute { .. } => x.copy_from_slice(&[o.theta, o.theta_dot]),
+            Self::Universal => x.copy_from_slice(&[o.phi, o.theta, o.phi_dot, o.theta_dot]),
+            Self::Spherical => {
+                x[..4].copy_from_slice(&o.q);
+                x[4..].copy_from_slice(o.omega.as_slice());
+            }
+            Self::SphericalRod => {
+                x[..3].copy_from_slice(o.direction.as_slice());
+                x[3..].copy_from_slice(o.omega.as_slice());
+            }
         }
     }
 }

@@ -1,20 +1,21 @@
 //! The double wishbone as a model: parameters checked, structure chosen, equations in named groups.
 
 use mechanics::{
-    Dim, Planar, Revolute, Rigid, Scalar, Space, Spherical, SpringDamper, Universal, Vector, conditioning,
+    Assembly, Baumgarte, ClosingJoint, Dim, Member, Parent, Place, Planar, Rigid, Scalar, Space, Spatial, SpringDamper,
+    Vector, conditioning,
 };
 use model::{
-    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, SymmetricTensor, System, Vector3,
+    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, Spectrum, SymmetricTensor, System, Vector3,
     Visitor,
 };
 
-use super::coordinates::{ArmCoordinates, CarrierCoordinates};
+use super::coordinates::Coordinates;
 use super::load::{LoadLaw, PulsePhase};
 use super::parameters::{
     ArmJoint, CarrierJoint, ClosureKind, ForceKind, Parameters, PreloadMode, SceneMotion, StabilisationKind,
 };
 use super::variables::{Dynamics, Energy, Inputs, Motion, THETA_1};
-use super::wishbone::{Closing, Wishbone};
+use super::wishbone::{CARRIER, Closing, LOWER, UPPER, Wishbone, named};
 
 /// Largest ratio of masses that passes without a warning.
 const MASS_RATIO: f64 = 1e6;
@@ -26,14 +27,11 @@ pub struct DoubleWishbone {
     parameters: Parameters,
 }
 
-/// One system for each combination of joint kinds; all but the planar one in space.
+/// In the plane or in space.
 #[derive(Debug, Clone)]
 enum Structure {
-    Planar(Wishbone<2, 1, 1, Planar, Planar>),
-    RevoluteSpherical(Wishbone<3, 1, 3, Revolute, Spherical>),
-    RevoluteUniversal(Wishbone<3, 1, 2, Revolute, Universal>),
-    UniversalSpherical(Wishbone<3, 2, 3, Universal, Spherical>),
-    UniversalUniversal(Wishbone<3, 2, 2, Universal, Universal>),
+    Planar(Wishbone<Planar, 2, 1>),
+    Spatial(Wishbone<Spatial, 3, 3>),
 }
 
 /// Do the same with whichever structure there is.
@@ -41,10 +39,7 @@ macro_rules! each {
     ($structure:expr, $w:ident => $body:expr) => {
         match $structure {
             Structure::Planar($w) => $body,
-            Structure::RevoluteSpherical($w) => $body,
-            Structure::RevoluteUniversal($w) => $body,
-            Structure::UniversalSpherical($w) => $body,
-            Structure::UniversalUniversal($w) => $body,
+            Structure::Spatial($w) => $body,
         }
     };
 }
@@ -66,19 +61,18 @@ impl Model for DoubleWishbone {
 
     fn new(p: &Parameters) -> Result<Self, ParameterError> {
         check(p)?;
-        let structure = match (p.motion, p.arm_joint, p.carrier_joint) {
-            (SceneMotion::Planar, ..) => Structure::Planar(Wishbone::new(p)?),
-            (_, ArmJoint::Revolute, CarrierJoint::Spherical) => {
-                Structure::RevoluteSpherical(Wishbone::new(p)?)
-            }
-            (_, ArmJoint::Revolute, CarrierJoint::Universal) => {
-                Structure::RevoluteUniversal(Wishbone::new(p)?)
-            }
-            (_, ArmJoint::Universal, CarrierJoint::Spherical) => {
-                Structure::UniversalSpherical(Wishbone::new(p)?)
-            }
-            (_, ArmJoint::Universal, CarrierJoint::Universal) => {
-                Structure::UniversalUniversal(Wishbone::new(p)?)
+        let structure = match p.motion {
+            SceneMotion::Planar => Structure::Planar(Wishbone::new(p, |_| Planar, Planar)?),
+            SceneMotion::Spatial => {
+                let arm = |phi| match p.arm_joint {
+                    ArmJoint::Revolute => Spatial::Revolute { phi },
+                    ArmJoint::Universal => Spatial::Universal,
+                };
+                let carrier = match p.carrier_joint {
+                    CarrierJoint::Spherical => Spatial::Spherical,
+                    CarrierJoint::Universal => Spatial::Universal,
+                };
+                Structure::Spatial(Wishbone::new(p, arm, carrier)?)
             }
         };
         Ok(Self {
@@ -114,17 +108,27 @@ impl Model for DoubleWishbone {
     }
 
     fn with_system<V: Visitor<Self>>(&self, visitor: V) -> V::Output {
+        // coordinates and rates of both arms and the carrier, and three energy integrals
         match &self.structure {
             Structure::Planar(w) => visitor.visit::<9, 0, _>(w),
-            Structure::RevoluteSpherical(w) => visitor.visit::<14, 0, _>(w),
-            Structure::RevoluteUniversal(w) => visitor.visit::<11, 0, _>(w),
-            Structure::UniversalSpherical(w) => visitor.visit::<18, 0, _>(w),
-            Structure::UniversalUniversal(w) => visitor.visit::<15, 0, _>(w),
+            Structure::Spatial(w) => match (self.parameters.arm_joint, self.parameters.carrier_joint) {
+                (ArmJoint::Revolute, CarrierJoint::Spherical) => visitor.visit::<14, 0, _>(w),
+                (ArmJoint::Revolute, CarrierJoint::Universal) => visitor.visit::<11, 0, _>(w),
+                (ArmJoint::Universal, CarrierJoint::Spherical) => visitor.visit::<18, 0, _>(w),
+                (ArmJoint::Universal, CarrierJoint::Universal) => visitor.visit::<15, 0, _>(w),
+            },
         }
+    }
+
+    fn for_model_exchange(&mut self) {
+        let terms = Baumgarte { a: self.parameters.stabilisation_a, b: self.parameters.stabilisation_b };
+        each!(&mut self.structure, w => if let Closing::Projection = w.closing {
+            w.closing = Closing::Baumgarte(terms);
+        });
     }
 }
 
-fn refused(
+pub(super) fn refused(
     variable: &'static str,
     value: f64,
     reason: impl Into<String>,
@@ -216,58 +220,65 @@ fn link_angles(r: &Vector3<f64>) -> (f64, f64) {
     }
 }
 
-impl<const D: usize, const NA: usize, const NC: usize, A, C> Wishbone<D, NA, NC, A, C>
+impl<J, const D: usize, const N: usize> Wishbone<J, D, N>
 where
-    A: ArmCoordinates<D, NA>,
-    C: CarrierCoordinates<D, NC>,
+    J: Coordinates<D, N>,
     Dim<D>: Space<D>,
 {
-    fn new(p: &Parameters) -> Result<Self, ParameterError> {
+    fn new(p: &Parameters, arm: impl Fn(f64) -> J, carrier: J) -> Result<Self, ParameterError> {
         let part = |v: Vector3<f64>| Dim::<D>::restrict(&v);
         let along = |x: f64| part(Vector3::new(x, 0.0, 0.0));
         let (L_1, L_3) = ((p.B - p.A).norm(), (p.C - p.D).norm());
         let rod = |m: f64, L: f64, Ixx: f64| {
             let across = m * L * L / 12.0;
-            Rigid {
-                m,
-                c: along(0.5 * L),
-                I_c: SymmetricTensor::diagonal(Ixx, across, across).matrix(),
-            }
+            Rigid { m, c: along(0.5 * L), I_c: SymmetricTensor::diagonal(Ixx, across, across).matrix() }
         };
         let (design_lower, design_upper) = (link_angles(&(p.B - p.A)), link_angles(&(p.C - p.D)));
         let foot = p.D + (p.C - p.D) * (p.s1 / L_3);
-        let l0 = if p.strut_l0 > 0.0 {
-            p.strut_l0
-        } else {
-            (p.T - foot).norm()
+        let l0 = if p.strut_l0 > 0.0 { p.strut_l0 } else { (p.T - foot).norm() };
+        let carrier = Member {
+            joint: carrier,
+            rigid: Rigid { m: p.carrier_mass, c: part(p.G - p.B), I_c: p.carrier_inertia.matrix() },
+            parent: Parent::Element(LOWER, along(L_1)),
         };
+        let lower = Member {
+            joint: arm(design_lower.0),
+            rigid: rod(p.lower_mass, L_1, p.lower_Ixx),
+            parent: Parent::Root(0),
+        };
+        let upper_rod = rod(p.upper_mass, L_3, p.upper_Ixx);
+        let bushed = p.closure == ClosureKind::Bushing;
+        // the upper link hangs at D, with a bushing at C: body vectors from there
+        let (root, hangs_at) = if bushed {
+            (along(L_3), Parent::Element(CARRIER, part(p.C - p.B)))
+        } else {
+            (along(0.0), Parent::Root(1))
+        };
+        let upper = Member {
+            joint: arm(design_upper.0),
+            rigid: Rigid { c: upper_rod.c - root, ..upper_rod },
+            parent: hangs_at,
+        };
+        let closure = ClosingJoint {
+            first: Place { element: CARRIER, point: part(p.C - p.B) },
+            second: Place { element: UPPER, point: along(L_3) },
+        };
+        let baumgarte = Baumgarte { a: p.stabilisation_a, b: p.stabilisation_b };
         let mut w = Self {
-            lower_joint: A::at_azimuth(design_lower.0),
-            carrier_joint: C::NEW,
-            upper_joint: A::at_azimuth(design_upper.0),
-            lower: rod(p.lower_mass, L_1, p.lower_Ixx),
-            carrier: Rigid {
-                m: p.carrier_mass,
-                c: part(p.G - p.B),
-                I_c: p.carrier_inertia.matrix(),
+            assembly: Assembly {
+                members: [lower, carrier, upper],
+                closures: [closure],
+                closed: usize::from(!bushed),
             },
-            upper: rod(p.upper_mass, L_3, p.upper_Ixx),
-            r_AB: along(L_1),
-            r_BC: part(p.C - p.B),
             r_BP: part(p.P - p.B),
             r_BR: part(p.tie_R - p.B),
-            r_DC: along(L_3),
-            r_DS: along(p.s1),
+            r_S: along(p.s1) - root,
+            r_CD: -root,
             r_A: part(p.A),
             r_D: part(p.D),
             r_T: part(p.T),
             r_tie: part(p.tie_T),
-            strut: SpringDamper {
-                k: 0.0,
-                c: None,
-                l0,
-                F_pre: 0.0,
-            },
+            strut: SpringDamper { k: 0.0, c: None, l0, F_pre: 0.0 },
             tie: p.use_tie.then(|| SpringDamper {
                 k: 0.0,
                 c: None,
@@ -277,15 +288,9 @@ where
             gravity: None,
             load: (p.force_kind == ForceKind::Internal).then(|| LoadLaw::new(p)),
             closing: match (p.closure, p.stabilisation) {
-                (ClosureKind::Bushing, _) => Closing::Bushing {
-                    k: p.closure_k,
-                    c: p.closure_c,
-                },
+                (ClosureKind::Bushing, _) => Closing::Bushing { k: p.closure_k, c: p.closure_c },
                 (_, StabilisationKind::None) => Closing::Rigid,
-                (_, StabilisationKind::Baumgarte) => Closing::Baumgarte {
-                    a: p.stabilisation_a,
-                    b: p.stabilisation_b,
-                },
+                (_, StabilisationKind::Baumgarte) => Closing::Baumgarte(baumgarte),
                 (_, StabilisationKind::Projection) => Closing::Projection,
             },
             energy: p.use_energy,
@@ -311,132 +316,13 @@ where
             tie.k = p.tie_k;
             tie.c = Some(p.tie_c);
         }
-        self.gravity = p
-            .use_gravity
-            .then(|| Dim::<D>::restrict(&p.gravity))
-            .filter(|g| !g.iter().all(|g| g.vanishes()));
+        let weight = p.use_gravity.then(|| Dim::<D>::restrict(&p.gravity));
+        self.gravity = weight.filter(|g| !g.iter().all(|g| g.vanishes()));
     }
-}
 
-/// Equations with `$n` states: coordinates, rates and the three energy integrals.
-macro_rules! system {
-    ($n:literal, $d:literal, $na:literal, $nc:literal, $A:ty, $C:ty) => {
-        impl System<$n, 0> for Wishbone<$d, $na, $nc, $A, $C> {
-            type Model = DoubleWishbone;
-            type Spectrum = Dense;
-
-            fn start(&self, t: f64, given: &Motion<f64>) -> Result<([f64; $n], PulsePhase), ParameterError> {
-                let mut x = [0.0; $n];
-                self.start_states(given, &mut x)?;
-                Ok((x, self.load.map_or(PulsePhase::After, |law| law.phase(t))))
-            }
-
-            #[inline]
-            fn rates<S: Scalar>(
-                &self,
-                t: S,
-                x: &[S; $n],
-                u: &Inputs<S>,
-                d: &PulsePhase,
-            ) -> Result<[S; $n], EvaluationError> {
-                let mut x_dot = [S::lift(0.0); $n];
-                self.state_rates(t, x, u, *d, &mut x_dot)?;
-                Ok(x_dot)
-            }
-
-            fn motion<S: Scalar>(
-                &self,
-                _t: S,
-                x: &[S; $n],
-                _u: &Inputs<S>,
-                _d: &PulsePhase,
-            ) -> Result<Motion<S>, EvaluationError> {
-                self.motion_outputs(x)
-            }
-
-            fn inertia<S: Scalar>(
-                &self,
-                _t: S,
-                _x: &[S; $n],
-                _u: &Inputs<S>,
-                _d: &PulsePhase,
-            ) -> Result<NoVariables, EvaluationError> {
-                Ok(NoVariables)
-            }
-
-            fn dynamics<S: Scalar>(
-                &self,
-                t: S,
-                x: &[S; $n],
-                u: &Inputs<S>,
-                d: &PulsePhase,
-            ) -> Result<Dynamics<S>, EvaluationError> {
-                self.dynamic_outputs(t, x, u, *d)
-            }
-
-            fn energy<S: Scalar>(
-                &self,
-                _t: S,
-                x: &[S; $n],
-                _u: &Inputs<S>,
-                _d: &PulsePhase,
-            ) -> Result<Energy<S>, EvaluationError> {
-                self.energy_outputs(x)
-            }
-
-            fn state_names(&self) -> [String; $n] {
-                let names = Self::names();
-                std::array::from_fn(|i| names[i].clone())
-            }
-
-            fn nominals(&self) -> [f64; $n] {
-                // energy integrals are quadratures: they follow the states and do not choose the step
-                std::array::from_fn(|i| {
-                    if i < Self::MECHANICAL {
-                        1.0
-                    } else {
-                        f64::INFINITY
-                    }
-                })
-            }
-
-            fn project(&self, _t: f64, x: &mut [f64; $n]) -> Result<bool, EvaluationError> {
-                self.project_states(x)
-            }
-
-            fn next_event(&self, d: &PulsePhase) -> Option<f64> {
-                self.load.and_then(|law| law.next_event(*d))
-            }
-
-            fn update(&self, t: f64, _x: &mut [f64; $n], _u: &Inputs<f64>, _d: &PulsePhase) -> PulsePhase {
-                self.load.map_or(PulsePhase::After, |law| law.phase(t))
-            }
-        }
-    };
-}
-system!(9, 2, 1, 1, Planar, Planar);
-system!(14, 3, 1, 3, Revolute, Spherical);
-system!(11, 3, 1, 2, Revolute, Universal);
-system!(18, 3, 2, 3, Universal, Spherical);
-system!(15, 3, 2, 2, Universal, Universal);
-
-impl<const D: usize, const NA: usize, const NC: usize, A, C> Wishbone<D, NA, NC, A, C>
-where
-    A: ArmCoordinates<D, NA>,
-    C: CarrierCoordinates<D, NC>,
-    Dim<D>: Space<D>,
-{
-    fn names() -> Vec<String> {
-        let element = |element: &str, names: &[&str]| -> Vec<String> {
-            names.iter().map(|n| format!("{element}.{n}")).collect()
-        };
-        [
-            element("lower", A::NAMES),
-            element("carrier", C::NAMES),
-            element("upper", A::NAMES),
-            element("energy", &["dissipated", "supplied", "port"]),
-        ]
-        .concat()
+    /// Number of states without the energy integrals.
+    fn mechanical(&self) -> usize {
+        self.assembly.states()
     }
 
     /// Section 7: the design position at rest, or the given lower angle with the loop closed.
@@ -450,61 +336,83 @@ where
             ("lower.angle_rate.theta", given.lower_theta_dot, 0.0),
         ] {
             if value != default {
-                return Err(refused(
-                    variable,
-                    value,
-                    "the start follows from the design points while start.override = false",
-                    format!("{default}, or start.override = true"),
-                ));
+                let reason = "the start follows from the design points while start.override = false";
+                return Err(refused(variable, value, reason, format!("{default}, or start.override = true")));
             }
         }
         self.design_states(x);
         Ok(())
     }
 
+    fn phase(&self, t: f64) -> PulsePhase {
+        self.load.map_or(PulsePhase::After, |law| law.phase(t))
+    }
+}
+
+/// Equations with `X` states: coordinates, rates and the three energy integrals.
+impl<J, const D: usize, const N: usize, const X: usize> System<X, 0> for Wishbone<J, D, N>
+where
+    J: Coordinates<D, N>,
+    Dim<D>: Space<D>,
+    Dense: Spectrum<X>,
+{
+    type Model = DoubleWishbone;
+    type Spectrum = Dense;
+
+    fn start(&self, t: f64, given: &Motion<f64>) -> Result<([f64; X], PulsePhase), ParameterError> {
+        let mut x = [0.0; X];
+        self.start_states(given, &mut x[..self.mechanical()])?;
+        Ok((x, self.phase(t)))
+    }
+
     #[inline]
-    fn state_rates<S: Scalar>(
+    fn rates<S: Scalar>(
         &self,
         t: S,
-        x: &[S],
+        x: &[S; X],
         u: &Inputs<S>,
-        d: PulsePhase,
-        x_dot: &mut [S],
-    ) -> Result<(), EvaluationError> {
+        d: &PulsePhase,
+    ) -> Result<[S; X], EvaluationError> {
+        let mut x_dot = [S::lift(0.0); X];
         let k = self.kinematics(x)?;
-        let loads = self.loads(t, u, d);
+        let loads = self.loads(t, u, *d);
         let a = self.accelerate(&k, &loads)?;
-        let (lower, carrier, upper) = Self::split(x);
-        let (lower_dot, rest) = x_dot.split_at_mut(A::STATES);
-        let (carrier_dot, rest) = rest.split_at_mut(C::STATES);
-        let (upper_dot, energies) = rest.split_at_mut(A::STATES);
-        self.lower_joint.derivative(lower, &a.q_lower, lower_dot);
-        self.carrier_joint.derivative(carrier, &a.q_carrier, carrier_dot);
-        self.upper_joint.derivative(upper, &a.q_upper, upper_dot);
+        let (coordinates, energies) = x_dot.split_at_mut(self.mechanical());
+        self.assembly.derivative(x, &a.q, coordinates);
         if self.energy {
             energies.copy_from_slice(&self.powers(&k, &loads, &a, &Dim::<D>::restrict(&u.chassis_a)));
         }
-        Ok(())
+        Ok(x_dot)
     }
 
-    fn motion_outputs<S: Scalar>(&self, x: &[S]) -> Result<Motion<S>, EvaluationError> {
+    fn motion<S: Scalar>(
+        &self,
+        _t: S,
+        x: &[S; X],
+        _u: &Inputs<S>,
+        _d: &PulsePhase,
+    ) -> Result<Motion<S>, EvaluationError> {
         let k = self.kinematics(x)?;
-        let (lower, carrier, upper) = Self::split(x);
-        let lower = self.lower_joint.angles(lower);
+        let mut states: [&[S]; 3] = [&[]; 3];
+        self.assembly.each(x, |i, own| states[i] = own);
+        let orientation = |i: usize| self.assembly.members[i].joint.orientation(states[i], i == CARRIER);
+        let lower = orientation(LOWER).link();
         let world = |v: Vector<S, D>| Dim::<D>::embed(&v);
+        let carrier = |p| k.elements.motion(CARRIER, p);
+        let ((P_r, P_v), (C_r, C_v)) = (carrier(&k.P), carrier(&k.C));
         Ok(Motion {
             lower_theta: lower.theta,
             lower_phi: lower.phi,
             lower_theta_dot: lower.theta_dot,
             lower_phi_dot: lower.phi_dot,
-            upper: self.upper_joint.angles(upper),
-            carrier: C::orientation(carrier),
-            P_r: world(k.r_B + k.P.r),
-            P_v: world(k.B.v + k.P.v),
-            B_r: world(k.r_B),
-            B_v: world(k.B.v),
-            C_r: world(k.r_B + k.C.r),
-            C_v: world(k.B.v + k.C.v),
+            upper: orientation(UPPER).link(),
+            carrier: orientation(CARRIER).carrier(),
+            P_r: world(P_r),
+            P_v: world(P_v),
+            B_r: world(k.elements.r[CARRIER]),
+            B_v: world(k.elements.v[CARRIER]),
+            C_r: world(C_r),
+            C_v: world(C_v),
             strut_length: k.strut.l,
             strut_rate: k.strut.l_dot,
             strut_force: k.strut.F_s,
@@ -513,52 +421,104 @@ where
         })
     }
 
-    fn dynamic_outputs<S: Scalar>(
+    fn inertia<S: Scalar>(
+        &self,
+        _t: S,
+        _x: &[S; X],
+        _u: &Inputs<S>,
+        _d: &PulsePhase,
+    ) -> Result<NoVariables, EvaluationError> {
+        Ok(NoVariables)
+    }
+
+    fn dynamics<S: Scalar>(
         &self,
         t: S,
-        x: &[S],
+        x: &[S; X],
         u: &Inputs<S>,
-        d: PulsePhase,
+        d: &PulsePhase,
     ) -> Result<Dynamics<S>, EvaluationError> {
         let k = self.kinematics(x)?;
-        let a = self.accelerate(&k, &self.loads(t, u, d))?;
+        let loads = self.loads(t, u, *d);
+        let a = self.accelerate(&k, &loads)?;
         let world = |v: Vector<S, D>| Dim::<D>::embed(&v);
-        let determined = a.closure.map(|Y| conditioning(&Y));
+        let (D_F, C_F, determined) = if self.bushing().is_some() {
+            (-self.bushing_force(&k), a.F[UPPER], None)
+        } else {
+            let K = self.closure_matrix(&k, &loads)?;
+            (a.F[UPPER], a.lambda[0], Some(conditioning(&K)))
+        };
         #[allow(clippy::cast_precision_loss, reason = "0..3")]
         let rank = S::lift(determined.map_or(0, |c| c.rank) as f64);
         Ok(Dynamics {
-            P_a: world(a.a_P),
-            B_a: world(a.a_B),
-            C_a: world(a.a_C),
-            A_F: world(a.F_A),
-            D_F: world(a.F_D),
+            P_a: world(a.at(CARRIER, &k.P)),
+            B_a: world(a.a[CARRIER]),
+            C_a: world(a.at(CARRIER, &k.C)),
+            A_F: world(a.F[LOWER]),
+            D_F: world(D_F),
             T_F: world(-(k.strut.e * k.strut.F_s)),
-            B_F: world(a.F_B),
-            C_F: world(a.F_C),
+            B_F: world(a.F[CARRIER]),
+            C_F: world(C_F),
             condition: determined.map_or(S::lift(1.0), |c| c.condition),
             rank,
         })
     }
 
-    fn energy_outputs<S: Scalar>(&self, x: &[S]) -> Result<Energy<S>, EvaluationError> {
+    fn energy<S: Scalar>(
+        &self,
+        _t: S,
+        x: &[S; X],
+        _u: &Inputs<S>,
+        _d: &PulsePhase,
+    ) -> Result<Energy<S>, EvaluationError> {
         let (kinetic, potential) = self.energies(&self.kinematics(x)?);
-        let [dissipated, supplied, port] = [0, 1, 2].map(|i| x[Self::MECHANICAL + i]);
-        Ok(Energy {
-            kinetic,
-            potential,
-            dissipated,
-            supplied,
-            port,
-        })
+        let [dissipated, supplied, port] = [0, 1, 2].map(|i| x[self.mechanical() + i]);
+        Ok(Energy { kinetic, potential, dissipated, supplied, port })
+    }
+
+    fn state_names(&self) -> [String; X] {
+        let mut names = Vec::with_capacity(X);
+        for (i, element) in ["lower", "carrier", "upper"].iter().enumerate() {
+            let joint = &self.assembly.members[i].joint;
+            let own = if i == CARRIER { joint.carrier_names() } else { joint.link_names() };
+            names.extend(own.iter().map(|n| format!("{element}.{}", n.trim_start_matches("orientation."))));
+        }
+        names.extend(["dissipated", "supplied", "port"].map(|n| format!("energy.{n}")));
+        std::array::from_fn(|i| names[i].clone())
+    }
+
+    fn nominals(&self) -> [f64; X] {
+        // energy integrals are quadratures: they follow the states and do not choose the step
+        std::array::from_fn(|i| if i < self.mechanical() { 1.0 } else { f64::INFINITY })
+    }
+
+    fn project(&self, _t: f64, x: &mut [f64; X]) -> Result<bool, EvaluationError> {
+        let x = &mut x[..self.mechanical()];
+        match self.closing {
+            Closing::Projection => self.assembly.project(x, |number| self.root(number)).map_err(named),
+            _ => Ok(self.assembly.normalise(x)),
+        }
+    }
+
+    fn off_manifold(&self, x: &[f64; X]) -> f64 {
+        self.assembly.off_manifold(&x[..self.mechanical()])
+    }
+
+    fn normalise(&self, x: &mut [f64; X]) -> bool {
+        self.assembly.normalise(&mut x[..self.mechanical()])
+    }
+
+    fn next_event(&self, d: &PulsePhase) -> Option<f64> {
+        self.load.and_then(|law| law.next_event(*d))
+    }
+
+    fn update(&self, t: f64, _x: &mut [f64; X], _u: &Inputs<f64>, _d: &PulsePhase) -> PulsePhase {
+        self.phase(t)
     }
 }
 
 /// Length of a vector, smooth enough at zero for dual numbers.
 fn magnitude<S: Scalar, const D: usize>(v: &Vector<S, D>) -> S {
     let squared = v.dot(v);
-    if squared.re().vanishes() {
-        S::lift(0.0)
-    } else {
-        squared.sqrt()
-    }
+    if squared.re().vanishes() { S::lift(0.0) } else { squared.sqrt() }
 }
