@@ -43,11 +43,14 @@ pub fn state_jacobian<const N: usize, const Z: usize, Y: System<N, Z>>(
 
 /// Eigenvalues of a square matrix of size `N`.
 pub trait Spectrum<const N: usize> {
-    /// Real and imaginary parts; `None` if an element is not finite.
+    /// Real and imaginary parts; `None` if an element is not finite or the iteration does not end.
     fn eigenvalues(m: &Matrix<f64, N, N>) -> Option<[(f64, f64); N]>;
 }
 
-/// Eigenvalues by the real Schur form, without allocation.
+/// Iterations after which the Schur form is given up.
+const MAX_ITERATIONS: usize = 1000;
+
+/// Eigenvalues by the real Schur form, without allocation; accurate to rounding of the norm.
 #[derive(Debug, Clone, Copy)]
 pub struct Dense;
 
@@ -57,10 +60,49 @@ where
     DefaultAllocator: Allocator<Const<N>, DimDiff<Const<N>, U1>> + Allocator<DimDiff<Const<N>, U1>>,
 {
     fn eigenvalues(m: &Matrix<f64, N, N>) -> Option<[(f64, f64); N]> {
-        if !m.iter().all(|v| v.is_finite()) {
-            return None; // the iteration would not end
+        let norm = m.norm();
+        if !norm.is_finite() {
+            return None;
         }
-        let lambda = m.complex_eigenvalues();
-        Some(std::array::from_fn(|i| (lambda[i].re, lambda[i].im)))
+        // shifted by its norm: deflation is relative to the diagonal, which a chain of zero
+        // eigenvalues does not have
+        let shifted = m + Matrix::<f64, N, N>::from_diagonal_element(norm);
+        let lambda = shifted.try_schur(f64::EPSILON, MAX_ITERATIONS)?.complex_eigenvalues();
+        Some(std::array::from_fn(|i| (lambda[i].re - norm, lambda[i].im)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sorted<const N: usize>(m: &Matrix<f64, N, N>) -> Vec<(f64, f64)>
+    where
+        Dense: Spectrum<N>,
+    {
+        let mut lambda = Dense::eigenvalues(m).expect("converges").to_vec();
+        lambda.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        lambda
+    }
+
+    /// A chain of zero eigenvalues beside an undamped pair: the iteration ends, the pair is right.
+    #[test]
+    fn nilpotent_blocks_do_not_hold_up_the_iteration() {
+        let mut m = Matrix::<f64, 6, 6>::zeros();
+        (m[(0, 1)], m[(1, 0)]) = (1.0, -180.0); // lambda = +- i sqrt(180)
+        (m[(2, 3)], m[(4, 5)], m[(5, 0)]) = (1.0, 1.0, 30.0);
+        let lambda = sorted(&m);
+        let largest = lambda.iter().map(|l| l.1).fold(0.0, f64::max);
+        assert!((largest - 180.0_f64.sqrt()).abs() < 1e-10);
+        assert!(lambda.iter().all(|l| l.0.abs() < 1e-4)); // a Jordan block of 2 at 1e-16: root of rounding
+    }
+
+    /// Companion matrix of (x - 1)(x - 2)(x + 3).
+    #[test]
+    fn roots_of_a_polynomial() {
+        let m = Matrix::<f64, 3, 3>::new(0.0, 7.0, -6.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0);
+        for (l, exact) in sorted(&m).iter().zip([-3.0, 1.0, 2.0]) {
+            assert!((l.0 - exact).abs() < 1e-13 && l.1.abs() < 1e-13);
+        }
     }
 }

@@ -236,40 +236,46 @@ where
         let (design_lower, design_upper) = (link_angles(&(p.B - p.A)), link_angles(&(p.C - p.D)));
         let foot = p.D + (p.C - p.D) * (p.s1 / L_3);
         let l0 = if p.strut_l0 > 0.0 { p.strut_l0 } else { (p.T - foot).norm() };
-        let carrier = Member {
-            joint: carrier,
-            rigid: Rigid { m: p.carrier_mass, c: part(p.G - p.B), I_c: p.carrier_inertia.matrix() },
-            parent: Parent::Element(LOWER, along(L_1)),
-        };
-        let lower = Member {
-            joint: arm(design_lower.0),
-            rigid: rod(p.lower_mass, L_1, p.lower_Ixx),
-            parent: Parent::Root(0),
-        };
-        let upper_rod = rod(p.upper_mass, L_3, p.upper_Ixx);
         let bushed = p.closure == ClosureKind::Bushing;
-        // the upper link hangs at D, with a bushing at C: body vectors from there
-        let (root, hangs_at) = if bushed {
-            (along(L_3), Parent::Element(CARRIER, part(p.C - p.B)))
-        } else {
-            (along(0.0), Parent::Root(1))
+        let (r_AB, r_BC, r_DC) = (along(L_1), part(p.C - p.B), along(L_3));
+        let upper_rod = rod(p.upper_mass, L_3, p.upper_Ixx);
+        let assembly = |bushed: bool| {
+            // the upper link hangs at D, with a bushing at C: body vectors from there
+            let (root, parent) = if bushed {
+                (r_DC, Parent::Element(CARRIER, r_BC))
+            } else {
+                (along(0.0), Parent::Root(1))
+            };
+            Assembly {
+                members: [
+                    Member {
+                        joint: arm(design_lower.0),
+                        rigid: rod(p.lower_mass, L_1, p.lower_Ixx),
+                        parent: Parent::Root(0),
+                    },
+                    Member {
+                        joint: carrier,
+                        rigid: Rigid { m: p.carrier_mass, c: part(p.G - p.B), I_c: p.carrier_inertia.matrix() },
+                        parent: Parent::Element(LOWER, r_AB),
+                    },
+                    Member {
+                        joint: arm(design_upper.0),
+                        rigid: Rigid { c: upper_rod.c - root, ..upper_rod },
+                        parent,
+                    },
+                ],
+                closures: [ClosingJoint {
+                    first: Place { element: CARRIER, point: r_BC },
+                    second: Place { element: UPPER, point: r_DC },
+                }],
+                closed: usize::from(!bushed),
+            }
         };
-        let upper = Member {
-            joint: arm(design_upper.0),
-            rigid: Rigid { c: upper_rod.c - root, ..upper_rod },
-            parent: hangs_at,
-        };
-        let closure = ClosingJoint {
-            first: Place { element: CARRIER, point: part(p.C - p.B) },
-            second: Place { element: UPPER, point: along(L_3) },
-        };
+        let root = if bushed { r_DC } else { along(0.0) };
         let baumgarte = Baumgarte { a: p.stabilisation_a, b: p.stabilisation_b };
         let mut w = Self {
-            assembly: Assembly {
-                members: [lower, carrier, upper],
-                closures: [closure],
-                closed: usize::from(!bushed),
-            },
+            assembly: assembly(bushed),
+            rigid: assembly(false),
             r_BP: part(p.P - p.B),
             r_BR: part(p.tie_R - p.B),
             r_S: along(p.s1) - root,

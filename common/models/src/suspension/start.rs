@@ -34,7 +34,7 @@ where
     }
 
     /// States with the given angle and rate of the lower link; the loop closed on positions and
-    /// velocities with the least change of all other coordinates, on the branch of the design
+    /// velocities (with a bushing too) with the least change of all other coordinates, on the branch of the design
     /// position.
     pub(super) fn assemble(&self, x: &mut [f64], given: &Motion<f64>) -> Result<(), ParameterError> {
         self.design_states(x);
@@ -50,7 +50,7 @@ where
             if i == steps {
                 x[rate] = given.lower_theta_dot;
             }
-            self.assembly.close_loops(x, |number| self.root(number), LOWER).map_err(|error| {
+            self.rigid.close_loops(x, |number| self.root(number), LOWER).map_err(|error| {
                 refused(
                     "lower.angle.theta",
                     given.lower_theta,

@@ -40,6 +40,8 @@ pub(super) enum Closing {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wishbone<J, const D: usize, const N: usize> {
     pub(super) assembly: Assembly<J, D, N, 3, 1, 1>,
+    /// The same with the loop closed rigidly, for a consistent start
+    pub(super) rigid: Assembly<J, D, N, 3, 1, 1>,
     /// Body vectors of P and of the tie rod's end R on the carrier, from B
     pub(super) r_BP: Vector<f64, D>,
     pub(super) r_BR: Vector<f64, D>,
