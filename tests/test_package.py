@@ -5,7 +5,13 @@ import pytest
 from koppel import Reference, Result
 from koppel.fmu import grid
 from koppel.reference import BadReference
-from koppel.work_precision import SATURATED, Setting, energy_balance, fitted_order, settings
+from koppel.work_precision import (
+    SATURATED,
+    Setting,
+    energy_balance,
+    fitted_order,
+    settings,
+)
 
 
 def result(t, **columns):
@@ -22,7 +28,9 @@ def reference(tmp_path):
 
 
 def test_error_is_taken_at_the_samples_and_scaled(reference):
-    error = reference.error_of(result([0.0, 0.1, 0.2], lower__angle__theta=[1.0, 2.3, 2.9], A__F__x=[0.0, -40.0, 12.0], x=[0, 0, 0]))
+    error = reference.error_of(
+        result([0.0, 0.1, 0.2], lower__angle__theta=[1.0, 2.3, 2.9], A__F__x=[0.0, -40.0, 12.0], x=[0, 0, 0])
+    )
     theta, force = error["lower.angle.theta"], error["A.F.x"]
     assert (theta.largest, theta.at, theta.scale) == pytest.approx((0.3, 0.1, 3.0))
     assert theta.rms == pytest.approx(np.sqrt((0.3**2 + 0.1**2) / 3))

@@ -20,6 +20,13 @@ def instance(wishbone):
 
 
 @pytest.fixture
+def initialising(instance):
+    """In Initialization Mode: parameters and inputs may be set and read."""
+    instance.enter_initialisation()
+    return instance
+
+
+@pytest.fixture
 def running(instance):
     """In Step Mode at t = 0.1 s."""
     instance.initialise({})
@@ -56,19 +63,30 @@ OUT_OF_RANGE = [
 
 
 @pytest.mark.parametrize(("name", "value"), OUT_OF_RANGE)
-def test_value_outside_its_range_is_discarded(instance, name, value):
-    before = instance.get(name)
-    outcome = instance.try_set(name, value)
+def test_value_outside_its_range_is_discarded(initialising, name, value):
+    before = initialising.get(name)
+    outcome = initialising.try_set(name, value)
     assert outcome.status == Status.DISCARD
     assert name in outcome.text, outcome.text
     assert value in numbers(outcome.text), f"the value is not named: {outcome.text}"
-    assert re.search(r">|<|≥|≤|between|at least|above|\[|\(|\.\.", outcome.text), f"the range is not named: {outcome.text}"
-    assert instance.get(name) == before
+    assert re.search(r">|<|≥|≤|between|at least|above|\[|\(|\.\.", outcome.text), (
+        f"the range is not named: {outcome.text}"
+    )
+    assert initialising.get(name) == before
+    initialising.exit_initialisation()
+    initialising.step(0.0, 0.1)
+
+
+def test_values_are_refused_before_initialisation_as_well(wishbone, instance):
+    for name, value in OUT_OF_RANGE:
+        outcome = instance.try_set(name, value)
+        assert outcome.status == Status.DISCARD and name in outcome.text, (name, outcome)
     instance.initialise({})
-    instance.step(0.0, 0.1)
+    for name, _ in OUT_OF_RANGE:
+        assert instance.get(name) == float(wishbone.variable(name).start)
 
 
-def test_declared_ranges_are_the_enforced_ones(wishbone, instance):
+def test_declared_ranges_are_the_enforced_ones(wishbone, initialising):
     """A value just below min and just above max is refused, min and max themselves are taken."""
     checked = 0
     for name in settable(wishbone):
@@ -77,21 +95,23 @@ def test_declared_ranges_are_the_enforced_ones(wishbone, instance):
             if bound is None:
                 continue
             bound = float(bound)
-            assert instance.try_set(name, bound).status == Status.OK, f"{name} = {bound}"
-            assert instance.try_set(name, math.nextafter(bound, outside)).status == Status.DISCARD, f"{name} past {bound}"
-            assert instance.get(name) == bound
+            assert initialising.try_set(name, bound).status == Status.OK, f"{name} = {bound}"
+            assert initialising.try_set(name, math.nextafter(bound, outside)).status == Status.DISCARD, (
+                f"{name} past {bound}"
+            )
+            assert initialising.get(name) == bound
             checked += 1
     assert checked >= 10
 
 
 @pytest.mark.parametrize("kind", NOT_FINITE)
-def test_no_input_or_parameter_takes_a_value_that_is_not_finite(wishbone, instance, kind):
+def test_no_input_or_parameter_takes_a_value_that_is_not_finite(wishbone, initialising, kind):
     for name in settable(wishbone):
-        before = instance.get(name)
-        outcome = instance.try_set(name, NOT_FINITE[kind])
+        before = initialising.get(name)
+        outcome = initialising.try_set(name, NOT_FINITE[kind])
         assert outcome.status == Status.DISCARD, name
         assert name in outcome.text and kind.strip("-") in outcome.text.lower(), outcome.text
-        assert instance.get(name) == before, name
+        assert initialising.get(name) == before, name
 
 
 def test_nan_force_in_a_run_is_discarded_and_the_run_goes_on(wishbone, running):
@@ -136,11 +156,11 @@ def test_huge_force_never_gives_a_silent_nan(wishbone, running, value):
 
 
 @pytest.mark.parametrize("value", [0, 8, -1, 2**40])
-def test_unknown_enumeration_item_is_discarded(instance, value):
-    outcome = instance.try_set("solver.method", value)
+def test_unknown_enumeration_item_is_discarded(initialising, value):
+    outcome = initialising.try_set("solver.method", value)
     assert outcome.status == Status.DISCARD
     assert "solver.method" in outcome.text and "rk4" in outcome.text, outcome.text
-    assert instance.get("solver.method") == 2
+    assert initialising.get("solver.method") == 2
 
 
 # parameters that do not fit together: Error on leaving initialisation ------------------------------------------------
@@ -272,30 +292,30 @@ def expect_error(outcome, *words):
     assert all(word in outcome.text for word in words), outcome.text
 
 
-def test_unknown_value_reference(instance):
+def test_unknown_value_reference(initialising):
     unknown = (c_uint * 1)(4_000_000_000)
     value = (c_double * 1)(1.0)
-    expect_error(instance.call("fmi3GetFloat64", unknown, 1, value, 1), "4000000000")
-    expect_error(instance.call("fmi3SetFloat64", unknown, 1, value, 1), "4000000000")
+    expect_error(initialising.call("fmi3GetFloat64", unknown, 1, value, 1), "4000000000")
+    expect_error(initialising.call("fmi3SetFloat64", unknown, 1, value, 1), "4000000000")
 
 
-def test_reference_of_another_type(wishbone, instance):
+def test_reference_of_another_type(wishbone, initialising):
     boolean = (c_uint * 1)(wishbone.variable("use.energy").valueReference)
-    expect_error(instance.call("fmi3GetFloat64", boolean, 1, (c_double * 1)(), 1), "use.energy")
+    expect_error(initialising.call("fmi3GetFloat64", boolean, 1, (c_double * 1)(), 1), "use.energy")
     mass = (c_uint * 1)(wishbone.variable("carrier.mass").valueReference)
-    expect_error(instance.call("fmi3SetInt64", mass, 1, (fmi3.fmi3Int64 * 1)(3), 1), "carrier.mass")
+    expect_error(initialising.call("fmi3SetInt64", mass, 1, (fmi3.fmi3Int64 * 1)(3), 1), "carrier.mass")
 
 
-def test_counts_that_do_not_match(wishbone, instance):
+def test_counts_that_do_not_match(wishbone, initialising):
     mass = (c_uint * 1)(wishbone.variable("carrier.mass").valueReference)
-    expect_error(instance.call("fmi3GetFloat64", mass, 1, (c_double * 2)(), 2))
+    expect_error(initialising.call("fmi3GetFloat64", mass, 1, (c_double * 2)(), 2))
 
 
-def test_null_pointers(instance):
-    expect_error(instance.call("fmi3GetFloat64", None, 1, (c_double * 1)(), 1))
-    expect_error(instance.call("fmi3GetFloat64", (c_uint * 1)(), 1, None, 1))
-    assert instance.call("fmi3GetFloat64", None, 0, None, 0).status == Status.OK
-    assert instance.call("fmi3SetFloat64", None, 0, None, 0).status == Status.OK
+def test_null_pointers(initialising):
+    expect_error(initialising.call("fmi3GetFloat64", None, 1, (c_double * 1)(), 1))
+    expect_error(initialising.call("fmi3GetFloat64", (c_uint * 1)(), 1, None, 1))
+    assert initialising.call("fmi3GetFloat64", None, 0, None, 0).status == Status.OK
+    assert initialising.call("fmi3SetFloat64", None, 0, None, 0).status == Status.OK
 
 
 def test_outputs_cannot_be_set(instance):
@@ -312,6 +332,8 @@ def test_fixed_parameters_cannot_be_set_in_a_run(running):
 def test_calls_in_the_wrong_phase(instance, wishbone):
     expect_error(instance.try_step(0.0, 0.1))
     expect_error(instance.call("fmi3ExitInitializationMode"))
+    value = (c_uint * 1)(wishbone.variable("carrier.mass").valueReference)
+    expect_error(instance.call("fmi3GetFloat64", value, 1, (c_double * 1)(), 1))
     expect_error(instance.call("fmi3EnterEventMode"))
     instance.initialise({})
     expect_error(instance.call("fmi3EnterInitializationMode", False, 0.0, 0.0, False, 0.0))

@@ -6,7 +6,7 @@ Shared by `scripts/demo` and the tests. The package is not installed: `scripts/l
 
 from .fmu import Fmu, FmuError, Instance, Message, Result, Status
 from .loader import Loader, LoaderError, Timing
-from .reference import Reference, BadReference
+from .reference import BadReference, Reference
 
 __all__ = [
     "Fmu",

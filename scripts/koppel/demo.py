@@ -34,6 +34,7 @@ def loaded(fmu: Fmu, recorded: list[str]) -> report.Loaded:
     """What of the product took part in the run."""
     parts = {}
     with fmu.instantiate() as instance:
+        instance.initialise({})
         for name, variable in fmu.variables.items():
             if variable.type == "Boolean" and name.startswith("use."):
                 parts[name] = "on" if instance.get(name) else "off"
@@ -66,7 +67,9 @@ def main():
         plots.figure18(reference, runs, out / "figure18.png")
         error = reference.error_of(runs["heun"])
 
-        print(f"double wishbone, {STOP:g} s, force at the wheel 10 N sin(10 rad/s t), communication step {work_precision.H} s")
+        print(
+            f"double wishbone, {STOP:g} s, force at the wheel 10 N sin(10 rad/s t), communication step {work_precision.H} s"
+        )
         print(f"reference: {reference.path.relative_to(paths.ROOT)}, amplitude of theta1 {amplitude:.6e} rad\n")
         print(work_precision.HEADER)
         print(work_precision.UNITS, flush=True)
@@ -74,7 +77,10 @@ def main():
             fmu, loader, reference, each=lambda point: print(work_precision.line(point), flush=True), stop=STOP
         )
         orders = {point.method: point.order for point in points}
-        print("\nfitted order: " + ", ".join(f"{method} {report.number(order, '.2f')}" for method, order in orders.items()))
+        print(
+            "\nfitted order: "
+            + ", ".join(f"{method} {report.number(order, '.2f')}" for method, order in orders.items())
+        )
         print("CPU in FMU: compiled loader; CPU fmpy: the same loop from Python; both without recording, minimum of 7")
         for tool, solver, time in report.PAPER_TABLE:
             print(f"paper, table 1: {tool + ' ' + solver:<28}{time * 1e3:>8.0f} ms  ({report.PAPER_MACHINE})")

@@ -16,6 +16,7 @@ from ctypes import byref, c_size_t, c_uint8
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
+from xml.etree import ElementTree
 
 import fmpy
 import numpy as np
@@ -162,6 +163,11 @@ class Fmu:
         """Folder with the resources."""
         return self.folder / "resources"
 
+    def capability(self, attribute: str) -> bool:
+        """A flag of the CoSimulation element, false unless declared (fmpy reads some of them under FMI 2.0 names)."""
+        element = ElementTree.parse(self.folder / "modelDescription.xml").getroot().find("CoSimulation")
+        return element.get(attribute, "false") in ("true", "1")
+
     def variable(self, name: str):
         """Description of a variable."""
         if name not in self.variables:
@@ -241,15 +247,13 @@ class Fmu:
         with self.instantiate() as instance:
             for measurement in range(-1, repeats):
                 spent, count = 0.0, 0
-                while spent < min_time:
+                while count == 0 or (spent < min_time and measurement >= 0):
                     if runs:
                         instance.reset()
                     instance.initialise(start_values or {}, start=start, stop=stop)
                     spent += instance.loop(t)
                     count += 1
                     runs += 1
-                    if measurement < 0:
-                        break
                 if measurement >= 0:
                     per_run.append(spent / count)
         return LoopTime(min(per_run), statistics.median(per_run), runs, len(t) - 1)
@@ -265,7 +269,9 @@ class Block:
             if instance.fmu.variable(name).type != "Float64":
                 raise TypeError(f"{name} is {instance.fmu.variable(name).type}, not Float64")
         self._instance = instance
-        self._references = (fmi3.fmi3ValueReference * n)(*[instance.fmu.variable(name).valueReference for name in self.names])
+        self._references = (fmi3.fmi3ValueReference * n)(
+            *[instance.fmu.variable(name).valueReference for name in self.names]
+        )
         self._buffer = (fmi3.fmi3Float64 * n)()
         self.values = np.ctypeslib.as_array(self._buffer) if n else np.empty(0)
 
@@ -302,7 +308,12 @@ class Instance:
             modelIdentifier=fmu.description.coSimulation.modelIdentifier,
             instanceName=name,
         )
-        self._slave.instantiate(loggingOn=logging, eventModeUsed=event_mode, logMessage=self._log)
+        self._component = None
+        try:
+            self._slave.instantiate(loggingOn=logging, eventModeUsed=event_mode, logMessage=self._log)
+        except Exception as failed:  # fmpy has no narrower class for "no instance"
+            self._slave.freeLibrary()
+            raise FmuError(fmu.name, "fmi3InstantiateCoSimulation", Status.ERROR, self.messages) from failed
         self._component = self._slave.component
         # results of doStep and updateDiscreteStates
         self._flags = [fmi3.fmi3Boolean() for _ in range(5)]
@@ -493,10 +504,14 @@ class Instance:
         self.check("fmi3DeserializeFMUState", (c_uint8 * len(data))(*data), len(data), byref(state))
         return state, at
 
-    def directional_derivative(self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]) -> np.ndarray:
+    def directional_derivative(
+        self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
+    ) -> np.ndarray:
         """d(unknowns)/d(knowns) times seed."""
         nu, nk = len(unknowns), len(knowns)
-        references = lambda names: (fmi3.fmi3ValueReference * len(names))(*[self.fmu.variable(n).valueReference for n in names])
+        references = lambda names: (fmi3.fmi3ValueReference * len(names))(
+            *[self.fmu.variable(n).valueReference for n in names]
+        )
         out = (fmi3.fmi3Float64 * nu)()
         self.check(
             "fmi3GetDirectionalDerivative",

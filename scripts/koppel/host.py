@@ -4,7 +4,7 @@ import os
 import platform
 import shutil
 import subprocess
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
@@ -40,7 +40,7 @@ def commit() -> str:
 def facts() -> dict[str, str]:
     """Machine, build and host program of a measurement."""
     return {
-        "date": datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
+        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "commit": commit(),
         "processor": f"{processor()}, {os.cpu_count()} cores; one thread used",
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",

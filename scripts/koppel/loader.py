@@ -81,7 +81,9 @@ class Loader:
             "mode": mode,
         }
 
-    def run(self, fmu: Fmu, start_values: Mapping[str, Value] | None = None, *, outputs: Sequence[str] = (), **options) -> Timing:
+    def run(
+        self, fmu: Fmu, start_values: Mapping[str, Value] | None = None, *, outputs: Sequence[str] = (), **options
+    ) -> Timing:
         """Time the FMU; `outputs` are sampled in a run of their own, outside the timer."""
         job = self.job(fmu, start_values, outputs=outputs, **options)
         done = subprocess.run(

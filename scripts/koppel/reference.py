@@ -120,7 +120,9 @@ class Error:
         """Which signal, how much, when."""
         rows = [f"{'signal':<26}{'largest':>12}{'unit':>7}{'at t/s':>9}{'rms':>11}{'e_max':>11}{'e_rms':>11}"]
         for s in sorted(self.signals, key=lambda signal: -signal.e_max):
-            rows.append(f"{s.name:<26}{s.largest:>12.3e}{s.unit:>7}{s.at:>9.3f}{s.rms:>11.2e}{s.e_max:>11.2e}{s.e_rms:>11.2e}")
+            rows.append(
+                f"{s.name:<26}{s.largest:>12.3e}{s.unit:>7}{s.at:>9.3f}{s.rms:>11.2e}{s.e_max:>11.2e}{s.e_rms:>11.2e}"
+            )
         return "\n".join(rows)
 
 
@@ -190,7 +192,9 @@ class Reference:
             rms = float(np.sqrt(np.mean(e * e)))
             signals.append(SignalError(name, kind, unit, float(e[worst]), float(result.t[mine][worst]), rms, scale))
         if not signals:
-            raise BadReference(f"the run recorded nothing that {self.path.name} has; it has {', '.join(self.variables)}")
+            raise BadReference(
+                f"the run recorded nothing that {self.path.name} has; it has {', '.join(self.variables)}"
+            )
         return Error(signals, len(mine))
 
     def _common(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

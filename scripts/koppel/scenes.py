@@ -44,6 +44,11 @@ def fixed(method: str, step: float) -> dict:
     return {"solver.method": method, "solver.step": step}
 
 
-def adaptive(method: str, rtol: float, atol_over_rtol: float = 1e-3) -> dict:
-    """A method with step-size control; angles and rates of these scenes are 1e-2 to 1, hence atol = rtol / 1000."""
-    return {"solver.method": method, "solver.rtol": rtol, "solver.atol": rtol * atol_over_rtol}
+def atol_of(rtol: float) -> float:
+    """atol = rtol / 1000: angles and rates of these scenes are 1e-2 to 1, so rtol decides."""
+    return float(f"{rtol / 1000.0:.6g}")
+
+
+def adaptive(method: str, rtol: float) -> dict:
+    """A method with step-size control."""
+    return {"solver.method": method, "solver.rtol": rtol, "solver.atol": atol_of(rtol)}

@@ -23,7 +23,6 @@ H = 0.05
 STEPS = (0.05, 0.025, 0.01, 0.005, 0.002, 0.001)
 #: Relative tolerances of the adaptive methods; atol = rtol / 1000.
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
-ATOL_OVER_RTOL = 1e-3
 FIXED = ("heun", "rk4")
 ADAPTIVE = ("dopri5",)
 
@@ -49,7 +48,7 @@ class Setting:
         """Parameters of the FMU."""
         if self.step is not None:
             return scenes.fixed(self.method, self.step)
-        return scenes.adaptive(self.method, self.rtol, ATOL_OVER_RTOL)
+        return scenes.adaptive(self.method, self.rtol)
 
     @property
     def label(self) -> str:
@@ -144,7 +143,9 @@ def run_point(
     theta = error["lower.angle.theta"].largest
     inside = loader.run(fmu, values, H=H, stop=stop, repeat=repeat, min_time=min_time)
     if inside.counts != result.counts:
-        raise RuntimeError(f"{setting.method} {setting.label}: counters {inside.counts} in the loader, {result.counts} in fmpy")
+        raise RuntimeError(
+            f"{setting.method} {setting.label}: counters {inside.counts} in the loader, {result.counts} in fmpy"
+        )
     through = fmu.time_loop(values, H=H, stop=stop, repeats=repeat, min_time=min_time)
     return Point(
         scene=scene,
@@ -152,7 +153,7 @@ def run_point(
         H=H,
         step=setting.step,
         rtol=setting.rtol,
-        atol=None if setting.rtol is None else setting.rtol * ATOL_OVER_RTOL,
+        atol=None if setting.rtol is None else scenes.atol_of(setting.rtol),
         e_max=error.e_max,
         e_rms=error.e_rms,
         theta_error=theta,
@@ -220,9 +221,7 @@ HEADER = (
     f"{'method':<8}{'step or tolerance':<19}{'theta error':>12}{'of ampl.':>10}{'force err.':>11}{'energy':>10}"
     f"{'CPU in FMU':>12}{'CPU fmpy':>11}{'real time':>11}{'steps':>8}{'rhs':>8}{'rej.':>6}"
 )
-UNITS = (
-    f"{'':<8}{'':<19}{'rad':>12}{'1':>10}{'N':>11}{'1':>10}{'ms':>12}{'ms':>11}{'x':>11}{'':>8}{'':>8}{'':>6}"
-)
+UNITS = f"{'':<8}{'':<19}{'rad':>12}{'1':>10}{'N':>11}{'1':>10}{'ms':>12}{'ms':>11}{'x':>11}{'':>8}{'':>8}{'':>6}"
 
 
 def line(point: Point) -> str:

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Write tests/reference/suspension/oracle_<case>.csv.
 
-    python tests/oracle/make.py            all cases (about five minutes, nearly all for the stiff bushings)
-    python tests/oracle/make.py drop tiny  only these
+python tests/oracle/make.py            all cases (about five minutes, nearly all for the stiff bushings)
+python tests/oracle/make.py drop tiny  only these
 """
 
 import sys

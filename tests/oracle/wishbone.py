@@ -248,7 +248,7 @@ class Wishbone:
             moved(CARRIER, B, self.B, self.G),
             moved(UPPER, C, self.C, self.centre[UPPER]),
         ]
-        kinetic = sum(0.5 * m * (v_i @ v_i) + 0.5 * I * w * w for m, v_i, I, w in zip(self.mass, v, self.inertia, rate))
+        kinetic = sum(0.5 * m * (v_c @ v_c) + 0.5 * J * w * w for m, v_c, J, w in zip(self.mass, v, self.inertia, rate))
         potential = (
             -sum(m * (self.gravity @ (h + at)) for m, h, at in zip(self.mass, height, self.centre))
             + 0.5 * self.k * stretch**2

@@ -81,12 +81,17 @@ pub fn model_description<M: Model>() -> io::Result<Vec<u8>> {
     Ok(xml.into_inner())
 }
 
+/// Dimensionless numbers have the unit 1.
+fn unit_name(unit: &'static str) -> &'static str {
+    if unit.is_empty() { "1" } else { unit }
+}
+
 fn units(xml: &mut Xml, table: &Table) -> io::Result<()> {
     let names: BTreeSet<_> = table
         .variables
         .iter()
-        .map(|v| v.entry.unit)
-        .filter(|u| !u.is_empty())
+        .filter(|v| v.entry.kind == Kind::Float64)
+        .map(|v| unit_name(v.entry.unit))
         .collect();
     xml.create_element("UnitDefinitions").write_inner_content(|xml| {
         for name in names {
@@ -170,7 +175,7 @@ fn variable(xml: &mut Xml, reference: usize, Variable { name, entry }: &Variable
     }
     match entry.kind {
         Kind::Enumeration(t) => attributes.push(("declaredType", t.name.into())),
-        Kind::Float64 if !entry.unit.is_empty() => attributes.push(("unit", entry.unit.into())),
+        Kind::Float64 => attributes.push(("unit", unit_name(entry.unit).into())),
         _ => {}
     }
     for (name, value) in [("min", entry.min), ("max", entry.max)] {

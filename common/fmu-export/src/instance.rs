@@ -1,7 +1,7 @@
 //! An instance of an FMU without its C boundary: values, phases, lazy outputs, steps.
 
 use integrators::{Solver, Statistics};
-use model::{Causality, Entry, Group, Kind, Model, Variables};
+use model::{Causality, Entry, Group, Kind, Model, ParameterError, Variables};
 use num_dual::Dual64;
 
 use crate::jobs::{Evaluate, Start, Step};
@@ -321,7 +321,10 @@ impl<M: Model> Instance<M> {
         let solver = SolverParameters::load(&self.state.values[Layout::<M>::SOLVER]);
         let solver = Solver::new(solver.settings()?)?;
         self.assemble()?;
-        self.refresh(ALL_FRESH)?;
+        self.refresh(ALL_FRESH).map_err(|fault| match fault {
+            Fault::Evaluation { source, .. } => ParameterError::Start(source).into(),
+            other => other,
+        })?;
         if let Some(model) = &self.state.model {
             self.warnings = model.warnings();
         }

@@ -45,7 +45,7 @@ const PLATFORM: &str = match (cfg!(target_os = "windows"), cfg!(target_os = "mac
 /// # Errors
 /// [`PackError`].
 pub fn archive<M: Model>(library: &[u8], extension: &str) -> Result<Vec<u8>, PackError> {
-    let files = [
+    let mut files = [
         (
             format!("binaries/{PLATFORM}/{}.{extension}", M::NAME),
             library.to_vec(),
@@ -64,6 +64,7 @@ pub fn archive<M: Model>(library: &[u8], extension: &str) -> Result<Vec<u8>, Pac
         ),
         ("modelDescription.xml".into(), model_description::<M>()?),
     ];
+    files.sort(); // the same order wherever it is built
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default())

@@ -16,7 +16,8 @@
 
 use crate::closure::{Band, InconsistentClosure};
 use crate::{
-    Answer, Body, Dim, Hinged, Joint, Load, Loaded, Matrix, NotPositiveDefinite, Point, Pose, Rigid, Scalar, Space, Vector,
+    Answer, Body, Dim, Hinged, Joint, Load, Loaded, Matrix, NotPositiveDefinite, Point, Pose, Rigid, Scalar,
+    Space, Vector,
 };
 
 /// What an element hangs on.
@@ -167,7 +168,8 @@ impl<S: Scalar, const D: usize, const N: usize, const B: usize, const C: usize> 
     }
 }
 
-impl<J, const D: usize, const N: usize, const B: usize, const C: usize, const W: usize> Assembly<J, D, N, B, C, W>
+impl<J, const D: usize, const N: usize, const B: usize, const C: usize, const W: usize>
+    Assembly<J, D, N, B, C, W>
 where
     J: Joint<D, N>,
     Dim<D>: Space<D>,
@@ -231,7 +233,12 @@ where
                 Parent::Element(parent, _) => (r[parent] + hangs_at[i].r, v[parent] + hangs_at[i].v),
             };
         }
-        Kinematics { poses, hangs_at, r, v }
+        Kinematics {
+            poses,
+            hangs_at,
+            r,
+            v,
+        }
     }
 
     /// Inertia of each element about its joint.
@@ -263,7 +270,9 @@ where
             hinged[i] = if held == Some(i) {
                 loaded[i].hold()
             } else {
-                loaded[i].hinge().map_err(|source| AssemblyError::Inertia { element: i, source })?
+                loaded[i]
+                    .hinge()
+                    .map_err(|source| AssemblyError::Inertia { element: i, source })?
             };
             if let Parent::Element(parent, _) = self.members[i].parent {
                 let Hinged { f, M, .. } = hinged[i];
@@ -279,13 +288,23 @@ where
         let ClosingJoint { first, second } = &self.closures[c];
         let (p_1, p_2) = (k.point(first), k.point(second));
         let ((r_1, v_1), (r_2, v_2)) = (k.motion(first.element, &p_1), k.motion(second.element, &p_2));
-        Gap { r: r_1 - r_2, v: v_1 - v_2, first: p_1, second: p_2 }
+        Gap {
+            r: r_1 - r_2,
+            v: v_1 - v_2,
+            first: p_1,
+            second: p_2,
+        }
     }
 
     /// Relative motion at all closing joints; zero for those not in use.
     #[inline]
     pub fn gaps<S: Scalar>(&self, k: &KinematicsOf<S, J, D, N, B>) -> [Gap<S, D, N>; C] {
-        let none = Gap { r: Vector::zeros(), v: Vector::zeros(), first: Point::zero(), second: Point::zero() };
+        let none = Gap {
+            r: Vector::zeros(),
+            v: Vector::zeros(),
+            first: Point::zero(),
+            second: Point::zero(),
+        };
         std::array::from_fn(|c| if c < self.closed { self.gap(k, c) } else { none })
     }
 
@@ -344,7 +363,9 @@ where
         let mut dq = [Matrix::<S, N, D>::zeros(); B];
         let unit = Matrix::<S, D, D>::identity();
         for i in 0..self.closed {
-            self.pair_inwards(k, tree, i, &gaps[i], unit, |element, answer| dq[element] += answer.q);
+            self.pair_inwards(k, tree, i, &gaps[i], unit, |element, answer| {
+                dq[element] += answer.q
+            });
             for j in i..(i + W).min(self.closed) {
                 let mut block = Matrix::<S, D, D>::zeros();
                 self.pair_inwards(k, tree, j, &gaps[j], unit, |element, answer| {
@@ -437,7 +458,8 @@ where
         if self.closed > 0 {
             for (c, gap) in gaps.iter().enumerate().take(self.closed) {
                 let ClosingJoint { first, second } = &self.closures[c];
-                let at = |place: &Place<D>, p: &Point<S, D, N>| a[place.element] + p.J * q[place.element] + p.c;
+                let at =
+                    |place: &Place<D>, p: &Point<S, D, N>| a[place.element] + p.J * q[place.element] + p.c;
                 let mut da = at(first, &gap.first) - at(second, &gap.second);
                 if let Some(Baumgarte { a, b }) = baumgarte {
                     da += gap.v * S::lift(2.0 * a) + gap.r * S::lift(b * b); // (19)
@@ -449,7 +471,13 @@ where
             (q, a) = self.outwards(k, &tree, &root, true);
         }
         let F = std::array::from_fn(|i| tree.hinged[i].root_force(&a[i]));
-        Ok(Accelerations { q, a, F, lambda, deficient })
+        Ok(Accelerations {
+            q,
+            a,
+            F,
+            lambda,
+            deficient,
+        })
     }
 
     /// Time derivative of all states.

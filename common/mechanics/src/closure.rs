@@ -93,7 +93,10 @@ where
     /// A zero matrix of `used` block rows.
     #[inline]
     pub fn new(used: usize) -> Self {
-        Self { rows: [[Matrix::<S, D, D>::zeros(); W]; C], used }
+        Self {
+            rows: [[Matrix::<S, D, D>::zeros(); W]; C],
+            used,
+        }
     }
 
     /// Set the block of rows `i`, columns `j >= i`.
@@ -193,11 +196,21 @@ where
     #[cold]
     fn solve_with_deficient_rank(&self, x: &mut [Vector<S, D>; C]) -> Result<(), InconsistentClosure> {
         let n = D * self.used;
-        let kept = |i: usize, j: usize| if j < self.end(i) { self.at(i, j) } else { S::lift(0.0) };
+        let kept = |i: usize, j: usize| {
+            if j < self.end(i) {
+                self.at(i, j)
+            } else {
+                S::lift(0.0)
+            }
+        };
         let K = DMatrix::from_fn(n, n, |i, j| kept(i.min(j), i.max(j)));
         let rhs = DVector::from_fn(n, |i, _| x[i / D][i % D]);
         let eigen = K.map(S::re).symmetric_eigen();
-        let P = pseudo_inverse(eigen.eigenvalues.iter().copied(), &eigen.eigenvectors, &rhs.map(S::re))?;
+        let P = pseudo_inverse(
+            eigen.eigenvalues.iter().copied(),
+            &eigen.eigenvectors,
+            &rhs.map(S::re),
+        )?;
         let P = P.map(S::lift);
         let F = &P * &rhs;
         let F = &F + &P * (&rhs - &K * &F);
@@ -230,7 +243,11 @@ fn pseudo_inverse(
 /// Refuse a right side of size `norm` with the part `gap` in a dropped direction.
 fn consistent(gap: f64, norm: f64) -> Result<(), InconsistentClosure> {
     let allowed = CONSISTENCY_TOLERANCE * norm;
-    if gap > allowed { Err(InconsistentClosure { gap, allowed }) } else { Ok(()) }
+    if gap > allowed {
+        Err(InconsistentClosure { gap, allowed })
+    } else {
+        Ok(())
+    }
 }
 
 /// How well a closure is determined.
@@ -331,13 +348,20 @@ mod tests {
                 let upper = Matrix2::new(1.0, 0.3, -0.2, 0.7);
                 band.set(i, i + 1, upper);
                 dense.view_mut((2 * i, 2 * i + 2), (2, 2)).copy_from(&upper);
-                dense.view_mut((2 * i + 2, 2 * i), (2, 2)).copy_from(&upper.transpose());
+                dense
+                    .view_mut((2 * i + 2, 2 * i), (2, 2))
+                    .copy_from(&upper.transpose());
             }
         }
-        let rhs = [Vector2::new(1.0, 2.0), Vector2::new(-3.0, 0.5), Vector2::new(0.1, 4.0)];
+        let rhs = [
+            Vector2::new(1.0, 2.0),
+            Vector2::new(-3.0, 0.5),
+            Vector2::new(0.1, 4.0),
+        ];
         let mut x = rhs;
         assert!(!band.solve(&mut x).expect("regular"));
-        let flat = |v: &[Vector2<f64>; 3]| DVector::from_iterator(6, v.iter().flat_map(|v| v.iter().copied()));
+        let flat =
+            |v: &[Vector2<f64>; 3]| DVector::from_iterator(6, v.iter().flat_map(|v| v.iter().copied()));
         assert!((&dense * flat(&x) - flat(&rhs)).norm() < 1e-14);
         let mut y = rhs;
         band.solve_with_deficient_rank(&mut y).expect("regular");

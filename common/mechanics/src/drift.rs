@@ -43,7 +43,8 @@ where
     band: Band<f64, D, C, W>,
 }
 
-impl<J, const D: usize, const N: usize, const B: usize, const C: usize, const W: usize> Assembly<J, D, N, B, C, W>
+impl<J, const D: usize, const N: usize, const B: usize, const C: usize, const W: usize>
+    Assembly<J, D, N, B, C, W>
 where
     J: Joint<D, N>,
     Dim<D>: Space<D>,
@@ -70,13 +71,20 @@ where
         let change = self.correction(&m.k, &m.tree, &m.gaps, off, &m.band)?;
         self.each_mut(x, |i, own| {
             let joint = &self.members[i].joint;
-            if rates { joint.push(own, &change[i]) } else { joint.shift(own, &change[i]) }
+            if rates {
+                joint.push(own, &change[i])
+            } else {
+                joint.shift(own, &change[i])
+            }
         });
         Ok(())
     }
 
     fn largest(&self, gaps: &[Gap<f64, D, N>; C], part: impl Fn(&Gap<f64, D, N>) -> Vector<f64, D>) -> f64 {
-        gaps.iter().take(self.closed).map(|gap| part(gap).norm()).fold(0.0, f64::max)
+        gaps.iter()
+            .take(self.closed)
+            .map(|gap| part(gap).norm())
+            .fold(0.0, f64::max)
     }
 
     /// Bring the states back on the loops, and every orientation on its manifold; true if they
@@ -124,7 +132,9 @@ where
     /// Largest distance of an orientation from its manifold.
     pub fn off_manifold(&self, x: &[f64]) -> f64 {
         let mut off = 0.0;
-        self.each(x, |i, own| off = f64::max(off, self.members[i].joint.off_manifold(own)));
+        self.each(x, |i, own| {
+            off = f64::max(off, self.members[i].joint.off_manifold(own))
+        });
         off
     }
 

@@ -144,7 +144,11 @@ impl Joint<2, 1> for Planar {
     #[inline]
     fn pose<S: Scalar>(&self, x: &[S]) -> PlanarPose<S> {
         let (sin, cos) = x[0].sin_cos();
-        PlanarPose { sin, cos, theta_dot: x[1] }
+        PlanarPose {
+            sin,
+            cos,
+            theta_dot: x[1],
+        }
     }
     #[inline]
     fn derivative<S: Scalar>(&self, x: &[S], q_ddot: &Vector<S, 1>, x_dot: &mut [S]) {

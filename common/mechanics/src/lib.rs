@@ -30,8 +30,8 @@ pub mod spatial;
 pub mod spring;
 
 pub use assembly::{
-    Accelerations, Assembly, AssemblyError, Baumgarte, ClosingJoint, Gap, Kinematics, KinematicsOf, Member, Parent,
-    Place, Tree,
+    Accelerations, Assembly, AssemblyError, Baumgarte, ClosingJoint, Gap, Kinematics, KinematicsOf, Member,
+    Parent, Place, Tree,
 };
 pub use closure::{Band, Conditioning, InconsistentClosure, close, conditioning};
 pub use drift::NotClosed;

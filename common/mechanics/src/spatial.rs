@@ -49,7 +49,9 @@ impl<S: Scalar> SpatialPose<S> {
 impl<S: Scalar> Pose<S, 3, 3> for SpatialPose<S> {
     #[inline]
     fn point(&self, p: &Vector<f64, 3>) -> Point<S, 3, 3> {
-        let Self { R, H, gamma, omega, .. } = self;
+        let Self {
+            R, H, gamma, omega, ..
+        } = self;
         let r = R * lift(p);
         let J = Matrix3::from_columns(&[
             H.column(0).cross(&r),
@@ -57,18 +59,34 @@ impl<S: Scalar> Pose<S, 3, 3> for SpatialPose<S> {
             H.column(2).cross(&r),
         ]);
         let v = omega.cross(&r);
-        Point { r, v, J, c: gamma.cross(&r) + omega.cross(&v) }
+        Point {
+            r,
+            v,
+            J,
+            c: gamma.cross(&r) + omega.cross(&v),
+        }
     }
     #[inline]
     fn body(&self, rigid: &Rigid<3>) -> Body<S, 3, 3> {
-        let Self { H, gamma, omega, axes, .. } = self;
+        let Self {
+            H,
+            gamma,
+            omega,
+            axes,
+            ..
+        } = self;
         let J_A = self.inertia(rigid);
         let torque = omega.cross(&(J_A * omega)) + J_A * gamma; // (5)
         let mut Mq = H.transpose() * J_A * H;
         for i in *axes..3 {
             Mq[(i, i)] = S::lift(1.0);
         }
-        Body { m: S::lift(rigid.m), com: self.point(&rigid.c), Mq, Q: -(H.transpose() * torque) }
+        Body {
+            m: S::lift(rigid.m),
+            com: self.point(&rigid.c),
+            Mq,
+            Q: -(H.transpose() * torque),
+        }
     }
     #[inline]
     fn spin_energy(&self, rigid: &Rigid<3>) -> S {
@@ -104,7 +122,12 @@ fn link_frame<S: Scalar>(phi: S, theta: S) -> (Matrix3<S>, Vector3<S>, Vector3<S
 fn quaternion_rate<S: Scalar>(p: &[S], omega: &[S]) -> [S; 4] {
     let (w, x, y, z) = (p[0], p[1], p[2], p[3]);
     let (a, b, c) = (omega[0] * 0.5, omega[1] * 0.5, omega[2] * 0.5);
-    [-a * x - b * y - c * z, a * w + b * z - c * y, b * w + c * x - a * z, c * w + a * y - b * x]
+    [
+        -a * x - b * y - c * z,
+        a * w + b * z - c * y,
+        b * w + c * x - a * z,
+        c * w + a * y - b * x,
+    ]
 }
 
 /// Rotation of a quaternion of any length.
@@ -170,7 +193,13 @@ impl Joint<3, 3> for Spatial {
             Self::Revolute { phi } => {
                 let (R, axis, _) = link_frame(S::lift(*phi), x[0]);
                 let H = Matrix3::from_columns(&[axis, o, o]);
-                SpatialPose { R, H, axes: 1, gamma: o, omega: axis * x[1] }
+                SpatialPose {
+                    R,
+                    H,
+                    axes: 1,
+                    gamma: o,
+                    omega: axis * x[1],
+                }
             }
             Self::Universal => {
                 let (phi_dot, theta_dot) = (x[2], x[3]);
@@ -311,7 +340,11 @@ mod tests {
     /// derivative of r along x(t), whatever the joint kind.
     fn kinematics_agree(joint: Spatial, x: &[f64], a: [f64; 3]) -> Result<(), TestCaseError> {
         // a rod without spin has its points on its axis
-        let p = if joint == Spatial::SphericalRod { Vector3::new(0.6, 0.0, 0.0) } else { Vector3::new(0.3, -0.1, 0.7) };
+        let p = if joint == Spatial::SphericalRod {
+            Vector3::new(0.6, 0.0, 0.0)
+        } else {
+            Vector3::new(0.3, -0.1, 0.7)
+        };
         let q_ddot = Vector3::from(a);
         let mut x = x[..joint.states()].to_vec();
         joint.normalise(&mut x);

@@ -24,14 +24,44 @@ pub(super) struct Orientation<S> {
 impl<S: Scalar> Orientation<S> {
     /// As the angles of a link.
     pub(super) fn link(self) -> LinkAngles<S> {
-        let Self { theta, phi, theta_dot, phi_dot, .. } = self;
-        LinkAngles { theta, phi, theta_dot, phi_dot }
+        let Self {
+            theta,
+            phi,
+            theta_dot,
+            phi_dot,
+            ..
+        } = self;
+        LinkAngles {
+            theta,
+            phi,
+            theta_dot,
+            phi_dot,
+        }
     }
 
     /// As the orientation of a carrier.
     pub(super) fn carrier(self) -> CarrierOrientation<S> {
-        let Self { psi, phi, theta, psi_dot, phi_dot, theta_dot, q, omega, .. } = self;
-        CarrierOrientation { psi, phi, theta, psi_dot, phi_dot, theta_dot, q, omega }
+        let Self {
+            psi,
+            phi,
+            theta,
+            psi_dot,
+            phi_dot,
+            theta_dot,
+            q,
+            omega,
+            ..
+        } = self;
+        CarrierOrientation {
+            psi,
+            phi,
+            theta,
+            psi_dot,
+            phi_dot,
+            theta_dot,
+            q,
+            omega,
+        }
     }
 }
 
@@ -78,9 +108,18 @@ fn unused<S: Scalar>() -> Orientation<S> {
 /// One angle, of a carrier or of a link at the azimuth `phi`.
 fn single_angle<S: Scalar>(x: &[S], phi: S, carrier: bool) -> Orientation<S> {
     if carrier {
-        Orientation { psi: x[0], psi_dot: x[1], ..unused() }
+        Orientation {
+            psi: x[0],
+            psi_dot: x[1],
+            ..unused()
+        }
     } else {
-        Orientation { theta: x[0], theta_dot: x[1], phi, ..unused() }
+        Orientation {
+            theta: x[0],
+            theta_dot: x[1],
+            phi,
+            ..unused()
+        }
     }
 }
 
@@ -101,7 +140,11 @@ impl Coordinates<2, 1> for Planar {
         single_angle(x, S::lift(0.0), carrier)
     }
     fn states_of(&self, o: &Orientation<f64>, x: &mut [f64], carrier: bool) {
-        let states = if carrier { [o.psi, o.psi_dot] } else { [o.theta, o.theta_dot] };
+        let states = if carrier {
+            [o.psi, o.psi_dot]
+        } else {
+            [o.theta, o.theta_dot]
+        };
         x.copy_from_slice(&states);
     }
 }
@@ -120,9 +163,14 @@ impl Coordinates<3, 3> for Spatial {
                 "omega.y",
                 "omega.z",
             ],
-            Self::SphericalRod => {
-                &["direction.x", "direction.y", "direction.z", "omega.x", "omega.y", "omega.z"]
-            }
+            Self::SphericalRod => &[
+                "direction.x",
+                "direction.y",
+                "direction.z",
+                "omega.x",
+                "omega.y",
+                "omega.z",
+            ],
         }
     }
     fn carrier_names(&self) -> &'static [&'static str] {
@@ -153,9 +201,13 @@ impl Coordinates<3, 3> for Spatial {
     fn orientation<S: Scalar>(&self, x: &[S], carrier: bool) -> Orientation<S> {
         match self {
             Self::Revolute { phi } => single_angle(x, S::lift(*phi), carrier),
-            Self::Universal => {
-                Orientation { phi: x[0], theta: x[1], phi_dot: x[2], theta_dot: x[3], ..unused() }
-            }
+            Self::Universal => Orientation {
+                phi: x[0],
+                theta: x[1],
+                phi_dot: x[2],
+                theta_dot: x[3],
+                ..unused()
+            },
             Self::Spherical => Orientation {
                 q: [x[0], x[1], x[2], x[3]],
                 omega: Vector3::new(x[4], x[5], x[6]),

@@ -1,12 +1,12 @@
 //! The double wishbone as a model: parameters checked, structure chosen, equations in named groups.
 
 use mechanics::{
-    Assembly, Baumgarte, ClosingJoint, Dim, Member, Parent, Place, Planar, Rigid, Scalar, Space, Spatial, SpringDamper,
-    Vector, conditioning,
+    Assembly, Baumgarte, ClosingJoint, Dim, Member, Parent, Place, Planar, Rigid, Scalar, Space, Spatial,
+    SpringDamper, Vector, conditioning,
 };
 use model::{
-    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, Spectrum, SymmetricTensor, System, Vector3,
-    Visitor,
+    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, Spectrum, SymmetricTensor,
+    System, Vector3, Visitor,
 };
 
 use super::coordinates::Coordinates;
@@ -121,7 +121,10 @@ impl Model for DoubleWishbone {
     }
 
     fn for_model_exchange(&mut self) {
-        let terms = Baumgarte { a: self.parameters.stabilisation_a, b: self.parameters.stabilisation_b };
+        let terms = Baumgarte {
+            a: self.parameters.stabilisation_a,
+            b: self.parameters.stabilisation_b,
+        };
         each!(&mut self.structure, w => if let Closing::Projection = w.closing {
             w.closing = Closing::Baumgarte(terms);
         });
@@ -231,11 +234,19 @@ where
         let (L_1, L_3) = ((p.B - p.A).norm(), (p.C - p.D).norm());
         let rod = |m: f64, L: f64, Ixx: f64| {
             let across = m * L * L / 12.0;
-            Rigid { m, c: along(0.5 * L), I_c: SymmetricTensor::diagonal(Ixx, across, across).matrix() }
+            Rigid {
+                m,
+                c: along(0.5 * L),
+                I_c: SymmetricTensor::diagonal(Ixx, across, across).matrix(),
+            }
         };
         let (design_lower, design_upper) = (link_angles(&(p.B - p.A)), link_angles(&(p.C - p.D)));
         let foot = p.D + (p.C - p.D) * (p.s1 / L_3);
-        let l0 = if p.strut_l0 > 0.0 { p.strut_l0 } else { (p.T - foot).norm() };
+        let l0 = if p.strut_l0 > 0.0 {
+            p.strut_l0
+        } else {
+            (p.T - foot).norm()
+        };
         let bushed = p.closure == ClosureKind::Bushing;
         let (r_AB, r_BC, r_DC) = (along(L_1), part(p.C - p.B), along(L_3));
         let upper_rod = rod(p.upper_mass, L_3, p.upper_Ixx);
@@ -255,24 +266,40 @@ where
                     },
                     Member {
                         joint: carrier,
-                        rigid: Rigid { m: p.carrier_mass, c: part(p.G - p.B), I_c: p.carrier_inertia.matrix() },
+                        rigid: Rigid {
+                            m: p.carrier_mass,
+                            c: part(p.G - p.B),
+                            I_c: p.carrier_inertia.matrix(),
+                        },
                         parent: Parent::Element(LOWER, r_AB),
                     },
                     Member {
                         joint: arm(design_upper.0),
-                        rigid: Rigid { c: upper_rod.c - root, ..upper_rod },
+                        rigid: Rigid {
+                            c: upper_rod.c - root,
+                            ..upper_rod
+                        },
                         parent,
                     },
                 ],
                 closures: [ClosingJoint {
-                    first: Place { element: CARRIER, point: r_BC },
-                    second: Place { element: UPPER, point: r_DC },
+                    first: Place {
+                        element: CARRIER,
+                        point: r_BC,
+                    },
+                    second: Place {
+                        element: UPPER,
+                        point: r_DC,
+                    },
                 }],
                 closed: usize::from(!bushed),
             }
         };
         let root = if bushed { r_DC } else { along(0.0) };
-        let baumgarte = Baumgarte { a: p.stabilisation_a, b: p.stabilisation_b };
+        let baumgarte = Baumgarte {
+            a: p.stabilisation_a,
+            b: p.stabilisation_b,
+        };
         let mut w = Self {
             assembly: assembly(bushed),
             rigid: assembly(false),
@@ -284,7 +311,12 @@ where
             r_D: part(p.D),
             r_T: part(p.T),
             r_tie: part(p.tie_T),
-            strut: SpringDamper { k: 0.0, c: None, l0, F_pre: 0.0 },
+            strut: SpringDamper {
+                k: 0.0,
+                c: None,
+                l0,
+                F_pre: 0.0,
+            },
             tie: p.use_tie.then(|| SpringDamper {
                 k: 0.0,
                 c: None,
@@ -294,7 +326,10 @@ where
             gravity: None,
             load: (p.force_kind == ForceKind::Internal).then(|| LoadLaw::new(p)),
             closing: match (p.closure, p.stabilisation) {
-                (ClosureKind::Bushing, _) => Closing::Bushing { k: p.closure_k, c: p.closure_c },
+                (ClosureKind::Bushing, _) => Closing::Bushing {
+                    k: p.closure_k,
+                    c: p.closure_c,
+                },
                 (_, StabilisationKind::None) => Closing::Rigid,
                 (_, StabilisationKind::Baumgarte) => Closing::Baumgarte(baumgarte),
                 (_, StabilisationKind::Projection) => Closing::Projection,
@@ -343,7 +378,12 @@ where
         ] {
             if value != default {
                 let reason = "the start follows from the design points while start.override = false";
-                return Err(refused(variable, value, reason, format!("{default}, or start.override = true")));
+                return Err(refused(
+                    variable,
+                    value,
+                    reason,
+                    format!("{default}, or start.override = true"),
+                ));
             }
         }
         self.design_states(x);
@@ -401,7 +441,11 @@ where
         let k = self.kinematics(x)?;
         let mut states: [&[S]; 3] = [&[]; 3];
         self.assembly.each(x, |i, own| states[i] = own);
-        let orientation = |i: usize| self.assembly.members[i].joint.orientation(states[i], i == CARRIER);
+        let orientation = |i: usize| {
+            self.assembly.members[i]
+                .joint
+                .orientation(states[i], i == CARRIER)
+        };
         let lower = orientation(LOWER).link();
         let world = |v: Vector<S, D>| Dim::<D>::embed(&v);
         let carrier = |p| k.elements.motion(CARRIER, p);
@@ -479,15 +523,28 @@ where
     ) -> Result<Energy<S>, EvaluationError> {
         let (kinetic, potential) = self.energies(&self.kinematics(x)?);
         let [dissipated, supplied, port] = [0, 1, 2].map(|i| x[self.mechanical() + i]);
-        Ok(Energy { kinetic, potential, dissipated, supplied, port })
+        Ok(Energy {
+            kinetic,
+            potential,
+            dissipated,
+            supplied,
+            port,
+        })
     }
 
     fn state_names(&self) -> [String; X] {
         let mut names = Vec::with_capacity(X);
         for (i, element) in ["lower", "carrier", "upper"].iter().enumerate() {
             let joint = &self.assembly.members[i].joint;
-            let own = if i == CARRIER { joint.carrier_names() } else { joint.link_names() };
-            names.extend(own.iter().map(|n| format!("{element}.{}", n.trim_start_matches("orientation."))));
+            let own = if i == CARRIER {
+                joint.carrier_names()
+            } else {
+                joint.link_names()
+            };
+            names.extend(
+                own.iter()
+                    .map(|n| format!("{element}.{}", n.trim_start_matches("orientation."))),
+            );
         }
         names.extend(["dissipated", "supplied", "port"].map(|n| format!("energy.{n}")));
         std::array::from_fn(|i| names[i].clone())
@@ -501,7 +558,10 @@ where
     fn project(&self, _t: f64, x: &mut [f64; X]) -> Result<bool, EvaluationError> {
         let x = &mut x[..self.mechanical()];
         match self.closing {
-            Closing::Projection => self.assembly.project(x, |number| self.root(number)).map_err(named),
+            Closing::Projection => self
+                .assembly
+                .project(x, |number| self.root(number))
+                .map_err(named),
             _ => Ok(self.assembly.normalise(x)),
         }
     }
@@ -526,5 +586,9 @@ where
 /// Length of a vector, smooth enough at zero for dual numbers.
 fn magnitude<S: Scalar, const D: usize>(v: &Vector<S, D>) -> S {
     let squared = v.dot(v);
-    if squared.re().vanishes() { S::lift(0.0) } else { squared.sqrt() }
+    if squared.re().vanishes() {
+        S::lift(0.0)
+    } else {
+        squared.sqrt()
+    }
 }
