@@ -36,19 +36,12 @@ def test_loader_reports_what_the_fmu_refuses(wishbone, loader):
         loader.run(wishbone, {**scenes.bushing(1e8, 1e4), **scenes.fixed("rk4", 0.05)}, H=0.05, stop=1.0)
 
 
-def test_loader_times_are_consistent(wishbone, loader):
-    timing = loader.run(wishbone, scenes.fixed("rk4", 1e-3), H=0.05, stop=10.0, repeat=3, min_time=0.02)
+def test_loader_counts_the_work_of_the_paper_run(wishbone, loader):
+    """200 steps and 400 evaluations in 10 s with Heun at 0.05 s; times are reported, they decide nothing."""
+    timing = loader.run(wishbone, scenes.fixed("heun", 0.05), H=0.05, stop=10.0, repeat=3, min_time=0.02)
+    assert (timing.steps, timing.counts["solver.steps"], timing.counts["solver.rhs_evaluations"]) == (200, 200, 400)
     assert 0.0 < timing.cpu_min <= timing.cpu_median
     assert 0.0 < timing.wall_min <= timing.wall_median
-    # five times the work takes longer than the work, whatever else the machine does
-    shorter = loader.run(wishbone, scenes.fixed("rk4", 5e-3), H=0.05, stop=10.0, repeat=3, min_time=0.02)
-    assert timing.cpu_min > 2.0 * shorter.cpu_min
-
-
-def test_paper_run_costs_at_most_a_fifth_of_a_millisecond(wishbone, loader):
-    """10 s with Heun at 0.05 s: 0.2 ms CPU inside the FMU (0.04 to 0.07 ms with a prototype in C)."""
-    timing = loader.run(wishbone, scenes.fixed("heun", 0.05), H=0.05, stop=10.0)
-    assert timing.cpu_min <= 0.2e-3
 
 
 def test_one_point_of_the_study(wishbone, loader, tmp_path):
