@@ -300,8 +300,9 @@ impl<M: Model> Instance<M> {
             return Ok(());
         }
         let values = &self.state.values;
-        let model = M::new(&M::Parameters::load(&values[Layout::<M>::PARAMETERS]))?;
         let given = &values[Layout::<M>::group(Group::Motion)];
+        let parameters = M::Parameters::load(&values[Layout::<M>::PARAMETERS]);
+        let model = M::new(&parameters, &M::Motion::load(given))?;
         let (x, discrete) = model.with_system(Start {
             t: self.state.start_time,
             given,

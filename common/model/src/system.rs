@@ -55,11 +55,12 @@ pub trait Model: Clone + Sized + 'static {
     /// Discrete states, changed by [`System::update`] only
     type Discrete: Copy + Default + PartialEq + std::fmt::Debug;
 
-    /// Check the parameters and prepare all constants.
+    /// Check the parameters and prepare all constants; `start`: start values of the motion group,
+    /// which hold constants such as a fixed azimuth.
     ///
     /// # Errors
     /// [`ParameterError`] for values that do not fit together.
-    fn new(parameters: &Self::Parameters) -> Result<Self, ParameterError>;
+    fn new(parameters: &Self::Parameters, start: &Self::Motion<f64>) -> Result<Self, ParameterError>;
 
     /// Take over changed tunable parameters; nothing else may change.
     fn retune(&mut self, parameters: &Self::Parameters);

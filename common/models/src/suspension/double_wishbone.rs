@@ -59,7 +59,7 @@ impl Model for DoubleWishbone {
     type Energy<S: Scalar> = Energy<S>;
     type Discrete = PulsePhase;
 
-    fn new(p: &Parameters) -> Result<Self, ParameterError> {
+    fn new(p: &Parameters, _start: &Motion<f64>) -> Result<Self, ParameterError> {
         check(p)?;
         let structure = match p.motion {
             SceneMotion::Planar => Structure::Planar(Wishbone::new(p, |_| Planar, Planar)?),
@@ -324,7 +324,7 @@ where
                 F_pre: 0.0,
             }),
             gravity: None,
-            load: (p.force_kind == ForceKind::Internal).then(|| LoadLaw::new(p)),
+            load: (p.force_kind == ForceKind::Internal).then(|| LoadLaw::new(&p.force)),
             closing: match (p.closure, p.stabilisation) {
                 (ClosureKind::Bushing, _) => Closing::Bushing {
                     k: p.closure_k,

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use mechanics::{Dim, Scalar, Space, Vector};
 
-use super::Parameters;
+use super::LoadParameters;
 
 /// Where the time stands relative to the pulse; changed by the time events at both ends.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -39,13 +39,13 @@ impl<const D: usize> LoadLaw<D>
 where
     Dim<D>: Space<D>,
 {
-    pub(super) fn new(p: &Parameters) -> Self {
+    pub(super) fn new(p: &LoadParameters) -> Self {
         let part = |v| Dim::<D>::restrict(&v);
         Self {
-            offset: part(p.force_offset),
-            amplitude: part(p.force_amplitude),
-            omega: part(p.force_omega),
-            phase: part(p.force_phase),
+            offset: part(p.offset),
+            amplitude: part(p.amplitude),
+            omega: part(p.omega),
+            phase: part(p.phase),
             pulse_amplitude: part(p.pulse_amplitude),
             pulse_start: p.pulse_start,
             pulse_duration: p.pulse_duration,
@@ -95,8 +95,8 @@ mod tests {
     use super::*;
 
     fn law(duration: f64) -> LoadLaw<2> {
-        let mut p = Parameters::default();
-        p.force_amplitude.z = 0.0;
+        let mut p = LoadParameters::default();
+        p.amplitude.z = 0.0;
         p.pulse_amplitude.z = 800.0;
         p.pulse_start = 0.5;
         p.pulse_duration = duration;

@@ -20,6 +20,7 @@ mod wishbone;
 pub use double_wishbone::DoubleWishbone;
 pub use load::PulsePhase;
 pub use parameters::{
-    ArmJoint, CarrierJoint, ClosureKind, ForceKind, Parameters, PreloadMode, SceneMotion, StabilisationKind,
+    ArmJoint, CarrierJoint, ClosureKind, ForceKind, LoadParameters, Parameters, PreloadMode, SceneMotion,
+    StabilisationKind,
 };
 pub use variables::{Dynamics, Energy, Inputs, Motion};

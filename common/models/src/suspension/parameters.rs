@@ -67,6 +67,33 @@ pub enum StabilisationKind {
     Projection = 3,
 }
 
+/// Parameters of the internal load.
+#[derive(Debug, Clone, Copy, PartialEq, Variables)]
+#[variables(parameter)]
+pub struct LoadParameters {
+    /// Constant part of the internal load [N]
+    #[var(name = "offset", start = 0.0)]
+    pub offset: Vector3<f64>,
+    /// Amplitude of the internal load [N]
+    #[var(name = "amplitude", start = [0.0, 0.0, 10.0])]
+    pub amplitude: Vector3<f64>,
+    /// Angular frequency of the internal load [rad/s]
+    #[var(name = "omega", start = [10.0, 10.0, 10.0])]
+    pub omega: Vector3<f64>,
+    /// Phase of the internal load [rad]
+    #[var(name = "phase", start = 0.0)]
+    pub phase: Vector3<f64>,
+    /// Amplitude of the half-sine pulse of the internal load [N]
+    #[var(name = "pulse.amplitude", start = 0.0)]
+    pub pulse_amplitude: Vector3<f64>,
+    /// Start of the pulse [s]
+    #[var(name = "pulse.start", start = 0.0)]
+    pub pulse_start: f64,
+    /// Duration of the pulse; 0: none [s]
+    #[var(name = "pulse.duration", start = 0.0, min = 0.0)]
+    pub pulse_duration: f64,
+}
+
 /// Parameters of the double wishbone.
 #[allow(clippy::struct_excessive_bools, reason = "each leaves out a part of its own")]
 #[derive(Debug, Clone, PartialEq, Variables)]
@@ -148,27 +175,9 @@ pub struct Parameters {
     /// Source of the load at P
     #[var(name = "force.kind", item = ForceKind::Internal)]
     pub force_kind: ForceKind,
-    /// Constant part of the internal load [N]
-    #[var(name = "force.offset", start = 0.0)]
-    pub force_offset: Vector3<f64>,
-    /// Amplitude of the internal load [N]
-    #[var(name = "force.amplitude", start = [0.0, 0.0, 10.0])]
-    pub force_amplitude: Vector3<f64>,
-    /// Angular frequency of the internal load [rad/s]
-    #[var(name = "force.omega", start = [10.0, 10.0, 10.0])]
-    pub force_omega: Vector3<f64>,
-    /// Phase of the internal load [rad]
-    #[var(name = "force.phase", start = 0.0)]
-    pub force_phase: Vector3<f64>,
-    /// Amplitude of the half-sine pulse of the internal load [N]
-    #[var(name = "force.pulse.amplitude", start = 0.0)]
-    pub pulse_amplitude: Vector3<f64>,
-    /// Start of the pulse [s]
-    #[var(name = "force.pulse.start", start = 0.0)]
-    pub pulse_start: f64,
-    /// Duration of the pulse; 0: none [s]
-    #[var(name = "force.pulse.duration", start = 0.0, min = 0.0)]
-    pub pulse_duration: f64,
+    #[var(prefix = "force.")]
+    #[allow(missing_docs, reason = "a group")]
+    pub force: LoadParameters,
 
     /// Gravity [m/s2]
     #[var(name = "gravity", start = 0.0, tunable)]
