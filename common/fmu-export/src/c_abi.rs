@@ -5,10 +5,7 @@
 
 #![allow(unsafe_code, reason = "C interface; every block states why it is sound")]
 #![allow(non_snake_case, reason = "names of the standard")]
-#![allow(
-    clippy::missing_safety_doc,
-    reason = "one contract for all: the pointers follow FMI 3.0"
-)]
+#![allow(clippy::missing_safety_doc, reason = "one contract for all: the pointers follow FMI 3.0")]
 #![allow(clippy::too_many_arguments, reason = "signatures of the standard")]
 
 use std::ffi::{CStr, CString, c_char, c_void};
@@ -34,14 +31,8 @@ const FATAL_CATEGORY: &CStr = c"logStatusFatal";
 /// The log categories with their meaning, as declared in the model description.
 pub const LOG_CATEGORIES: [(&CStr, &str); 4] = [
     (WARNING_CATEGORY, "Allowed, but probably not meant"),
-    (
-        DISCARD_CATEGORY,
-        "A step or value is refused; nothing has changed and the run may go on",
-    ),
-    (
-        ERROR_CATEGORY,
-        "A wrong call, or parameters that do not fit together",
-    ),
+    (DISCARD_CATEGORY, "A step or value is refused; nothing has changed and the run may go on"),
+    (ERROR_CATEGORY, "A wrong call, or parameters that do not fit together"),
     (FATAL_CATEGORY, "Internal error; the instance is lost"),
 ];
 
@@ -172,26 +163,16 @@ pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
     environment: *mut c_void,
     log_message: Option<LogMessage>,
 ) -> *mut c_void {
-    let log = Log {
-        environment,
-        callback: log_message,
-        categories: None,
-    };
+    let log = Log { environment, callback: log_message, categories: None };
     let refuse = |message: &str| {
-        log.send(
-            Status::Error,
-            ERROR_CATEGORY,
-            &format!("fmi3InstantiateCoSimulation: {message}"),
-        );
+        log.send(Status::Error, ERROR_CATEGORY, &format!("fmi3InstantiateCoSimulation: {message}"));
         std::ptr::null_mut()
     };
     let created = catch_unwind(|| {
         // SAFETY: FMI: the token is a null-terminated string.
         let (given, expected) = (unsafe { text(token) }, Instance::<M>::token());
         if given != expected {
-            return Err(format!(
-                "instantiationToken is \"{given}\"; this binary belongs to \"{expected}\""
-            ));
+            return Err(format!("instantiationToken is \"{given}\"; this binary belongs to \"{expected}\""));
         }
         if event_mode_used != 0 {
             return Err("eventModeUsed = true is not supported (hasEventMode is not declared)".into());
@@ -212,16 +193,8 @@ pub unsafe fn refuse_instance(
     environment: *mut c_void,
     log_message: Option<LogMessage>,
 ) -> *mut c_void {
-    let log = Log {
-        environment,
-        callback: log_message,
-        categories: None,
-    };
-    log.send(
-        Status::Error,
-        ERROR_CATEGORY,
-        &format!("{function} is not supported: {reason}"),
-    );
+    let log = Log { environment, callback: log_message, categories: None };
+    log.send(Status::Error, ERROR_CATEGORY, &format!("{function} is not supported: {reason}"));
     std::ptr::null_mut()
 }
 
@@ -248,9 +221,8 @@ pub unsafe fn fmi3SetDebugLogging<M: Model>(
             let mut chosen = Vec::with_capacity(n);
             for name in names {
                 let name = text(*name);
-                let Some((category, _)) = LOG_CATEGORIES
-                    .iter()
-                    .find(|(c, _)| c.to_bytes() == name.as_bytes())
+                let Some((category, _)) =
+                    LOG_CATEGORIES.iter().find(|(c, _)| c.to_bytes() == name.as_bytes())
                 else {
                     return Err(Fault::Unsupported {
                         function: "this log category",
@@ -275,8 +247,7 @@ pub unsafe fn fmi3EnterInitializationMode<M: Model>(
     // SAFETY: FMI instance, checked for null by `call`; the same for the functions below.
     unsafe {
         call::<M>(instance, &phase::ENTER_INITIALIZATION, |c| {
-            c.instance
-                .enter_initialization(start, (stop_defined != 0).then_some(stop))
+            c.instance.enter_initialization(start, (stop_defined != 0).then_some(stop))
         })
     }
 }
@@ -295,11 +266,7 @@ pub unsafe fn fmi3ExitInitializationMode<M: Model>(instance: *mut c_void) -> Sta
             Ok(())
         })
     };
-    if status == Status::Ok && warned {
-        Status::Warning
-    } else {
-        status
-    }
+    if status == Status::Ok && warned { Status::Warning } else { status }
 }
 
 #[doc(hidden)]
@@ -366,8 +333,7 @@ pub unsafe fn fmi3GetFloat64<M: Model>(
     unsafe {
         call::<M>(instance, &phase::GET_FLOAT64, |c| {
             let references = array("valueReferences", references, n)?;
-            c.instance
-                .get_float64(references, array_mut("values", values, n_values)?)
+            c.instance.get_float64(references, array_mut("values", values, n_values)?)
         })
     }
 }
@@ -383,13 +349,10 @@ pub unsafe fn fmi3SetFloat64<M: Model>(
     // SAFETY: FMI pointers, checked for null.
     unsafe {
         call::<M>(instance, &phase::SET_FLOAT64, |c| {
-            let (references, values) = (
-                array("valueReferences", references, n)?,
-                array("values", values, n_values)?,
-            );
+            let (references, values) =
+                (array("valueReferences", references, n)?, array("values", values, n_values)?);
             crate::instance::same_length(n, n_values)?;
-            c.instance
-                .set(references, "Float64", |k| k == Kind::Float64, |i| values[i])
+            c.instance.set(references, "Float64", |k| k == Kind::Float64, |i| values[i])
         })
     }
 }
@@ -412,12 +375,7 @@ macro_rules! whole_number_access {
                     let values = array_mut("values", values, n_values)?;
                     crate::instance::same_length(n, n_values)?;
                     let to: fn(f64) -> $c_type = $to;
-                    c.instance.get_whole(
-                        references,
-                        $called,
-                        |k| matches!(k, $is),
-                        |i, v| values[i] = to(v),
-                    )
+                    c.instance.get_whole(references, $called, |k| matches!(k, $is), |i, v| values[i] = to(v))
                 })
             }
         }
@@ -437,12 +395,7 @@ macro_rules! whole_number_access {
                     let values = array("values", values, n_values)?;
                     crate::instance::same_length(n, n_values)?;
                     let from: fn($c_type) -> f64 = $from;
-                    c.instance.set(
-                        references,
-                        $called,
-                        |k| matches!(k, $is),
-                        |i| from(values[i]),
-                    )
+                    c.instance.set(references, $called, |k| matches!(k, $is), |i| from(values[i]))
                 })
             }
         }
@@ -490,11 +443,7 @@ pub unsafe fn unsupported<M: Model>(
     reason: &'static str,
 ) -> Status {
     // SAFETY: FMI instance, checked for null by `call`.
-    unsafe {
-        call::<M>(instance, &phase::UNSUPPORTED, |_| {
-            Err(Fault::Unsupported { function, reason })
-        })
-    }
+    unsafe { call::<M>(instance, &phase::UNSUPPORTED, |_| Err(Fault::Unsupported { function, reason })) }
 }
 
 #[doc(hidden)]
@@ -517,10 +466,7 @@ pub unsafe fn fmi3SetFMUState<M: Model>(instance: *mut c_void, state: *mut c_voi
     // SAFETY: a state that is not null came from `fmi3GetFMUState` and was not freed (FMI).
     unsafe {
         call::<M>(instance, &phase::SET_FMU_STATE, |c| {
-            let saved = state
-                .cast::<State<M>>()
-                .as_ref()
-                .ok_or(Fault::Null { argument: "FMUState" })?;
+            let saved = state.cast::<State<M>>().as_ref().ok_or(Fault::Null { argument: "FMUState" })?;
             c.instance.restore(saved);
             Ok(())
         })

@@ -67,14 +67,9 @@ pub fn model_description<M: Model>() -> io::Result<Vec<u8>> {
                 ])
                 .write_empty()?;
             xml.create_element("ModelVariables").write_inner_content(|xml| {
-                table
-                    .variables
-                    .iter()
-                    .enumerate()
-                    .try_for_each(|(reference, v)| variable(xml, reference, v))
+                table.variables.iter().enumerate().try_for_each(|(reference, v)| variable(xml, reference, v))
             })?;
-            xml.create_element("ModelStructure")
-                .write_inner_content(|xml| structure(xml, &table))?;
+            xml.create_element("ModelStructure").write_inner_content(|xml| structure(xml, &table))?;
             Ok(())
         })?;
     xml.write_event(Event::Text(BytesText::new("\n")))?;
@@ -97,18 +92,12 @@ fn units(xml: &mut Xml, table: &Table) -> io::Result<()> {
         for name in names {
             let unit =
                 BaseUnit::parse(name).ok_or_else(|| io::Error::other(format!("unit {name} is not known")))?;
-            xml.create_element("Unit")
-                .with_attribute(("name", name))
-                .write_inner_content(|xml| {
-                    let attributes: Vec<_> = unit.attributes().collect();
-                    let attributes = attributes
-                        .iter()
-                        .map(|(name, exponent)| (*name, exponent.as_str()));
-                    xml.create_element("BaseUnit")
-                        .with_attributes(attributes)
-                        .write_empty()?;
-                    Ok(())
-                })?;
+            xml.create_element("Unit").with_attribute(("name", name)).write_inner_content(|xml| {
+                let attributes: Vec<_> = unit.attributes().collect();
+                let attributes = attributes.iter().map(|(name, exponent)| (*name, exponent.as_str()));
+                xml.create_element("BaseUnit").with_attributes(attributes).write_empty()?;
+                Ok(())
+            })?;
         }
         Ok(())
     })?;
@@ -194,9 +183,7 @@ fn variable(xml: &mut Xml, reference: usize, Variable { name, entry }: &Variable
         attributes.push(("start", start));
     }
     let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
-    xml.create_element(kind_name(entry.kind))
-        .with_attributes(attributes)
-        .write_empty()?;
+    xml.create_element(kind_name(entry.kind)).with_attributes(attributes).write_empty()?;
     Ok(())
 }
 
@@ -206,11 +193,7 @@ fn structure(xml: &mut Xml, table: &Table) -> io::Result<()> {
         .filter(|i| table.variables[*i].entry.causality == Causality::Output)
         .collect();
     for output in &outputs {
-        let inputs: Vec<_> = table
-            .dependencies(*output)
-            .iter()
-            .map(ToString::to_string)
-            .collect();
+        let inputs: Vec<_> = table.dependencies(*output).iter().map(ToString::to_string).collect();
         xml.create_element("Output")
             .with_attributes([
                 ("valueReference", output.to_string().as_str()),

@@ -184,11 +184,7 @@ fn method_name(number: i64) -> &'static str {
     let Kind::Enumeration(methods) = <SolverMethod as Variables<f64>>::TABLE[0].kind else {
         return "";
     };
-    methods
-        .items
-        .iter()
-        .find(|i| i.value == number)
-        .map_or("unknown", |i| i.name)
+    methods.items.iter().find(|i| i.value == number).map_or("unknown", |i| i.name)
 }
 
 impl Fault {

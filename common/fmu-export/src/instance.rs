@@ -38,23 +38,13 @@ pub struct State<M: Model> {
 
 impl<M: Model> Clone for State<M> {
     fn clone(&self) -> Self {
-        Self {
-            values: self.values.clone(),
-            model: self.model.clone(),
-            x: self.x.clone(),
-            ..*self
-        }
+        Self { values: self.values.clone(), model: self.model.clone(), x: self.x.clone(), ..*self }
     }
     fn clone_from(&mut self, other: &Self) {
         let (mut values, mut x) = (std::mem::take(&mut self.values), std::mem::take(&mut self.x));
         values.clone_from(&other.values);
         x.clone_from(&other.x);
-        *self = Self {
-            values,
-            x,
-            model: other.model.clone(),
-            ..*other
-        };
+        *self = Self { values, x, model: other.model.clone(), ..*other };
     }
 }
 
@@ -99,12 +89,7 @@ impl<M: Model> Instance<M> {
     pub fn new() -> Self {
         let table = Table::new::<M>();
         let state = State::new(&table);
-        Self {
-            duals: vec![Dual64::from_re(0.0); table.variables.len()],
-            table,
-            state,
-            warnings: Vec::new(),
-        }
+        Self { duals: vec![Dual64::from_re(0.0); table.variables.len()], table, state, warnings: Vec::new() }
     }
 
     /// Hash of the variable table.
@@ -143,10 +128,7 @@ impl<M: Model> Instance<M> {
         self.table
             .variables
             .get(reference as usize)
-            .ok_or(Fault::UnknownReference {
-                reference,
-                count: self.table.variables.len(),
-            })
+            .ok_or(Fault::UnknownReference { reference, count: self.table.variables.len() })
     }
 
     /// Read Float64 variables.
@@ -171,12 +153,9 @@ impl<M: Model> Instance<M> {
 
     fn wrong_type(&self, reference: u32, called: &'static str) -> Fault {
         match self.variable(reference) {
-            Ok(v) => Fault::WrongType {
-                variable: v.name.clone(),
-                reference,
-                is: kind_name(v.entry.kind),
-                called,
-            },
+            Ok(v) => {
+                Fault::WrongType { variable: v.name.clone(), reference, is: kind_name(v.entry.kind), called }
+            }
             Err(fault) => fault,
         }
     }
@@ -221,11 +200,7 @@ impl<M: Model> Instance<M> {
             }
             if let Some(reason) = self.not_settable(entry) {
                 let phase = format!("{:?}", self.state.phase);
-                return Err(Fault::NotSettable {
-                    variable: name.clone(),
-                    phase,
-                    reason,
-                });
+                return Err(Fault::NotSettable { variable: name.clone(), phase, reason });
             }
             if !in_range(entry, value(i)) {
                 let kept = self.state.values[*reference as usize];
@@ -272,11 +247,7 @@ impl<M: Model> Instance<M> {
     /// Times that make no sense.
     pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
         if !start.is_finite() {
-            return Err(Fault::Argument {
-                argument: "startTime",
-                value: start,
-                allowed: "finite".into(),
-            });
+            return Err(Fault::Argument { argument: "startTime", value: start, allowed: "finite".into() });
         }
         if let Some(stop) = stop
             && !(stop.is_finite() && stop > start)
@@ -303,10 +274,7 @@ impl<M: Model> Instance<M> {
         let given = &values[Layout::<M>::group(Group::Motion)];
         let parameters = M::Parameters::load(&values[Layout::<M>::PARAMETERS]);
         let model = M::new(&parameters, &M::Motion::load(given))?;
-        let (x, discrete) = model.with_system(Start {
-            t: self.state.start_time,
-            given,
-        })?;
+        let (x, discrete) = model.with_system(Start { t: self.state.start_time, given })?;
         self.state.x = x;
         self.state.discrete = discrete;
         self.state.model = Some(model);
@@ -356,14 +324,7 @@ impl<M: Model> Instance<M> {
             return Ok(());
         }
         self.tuned()?;
-        let State {
-            values,
-            model,
-            x,
-            discrete,
-            fresh,
-            ..
-        } = &mut self.state;
+        let State { values, model, x, discrete, fresh, .. } = &mut self.state;
         let Some(model) = model else { return Ok(()) };
         let t = values[0];
         for group in Group::ALL {
@@ -377,22 +338,11 @@ impl<M: Model> Instance<M> {
             let outputs = &mut outputs[..range.len()];
             let u = &before[Layout::<M>::INPUTS];
             model
-                .with_system(Evaluate {
-                    group,
-                    t,
-                    x,
-                    u,
-                    d: discrete,
-                    values: outputs,
-                })
+                .with_system(Evaluate { group, t, x, u, d: discrete, values: outputs })
                 .map_err(|source| Fault::Evaluation { t, source })?;
             if let Some(i) = outputs.iter().position(|v| !v.is_finite()) {
                 let variable = self.table.variables[range.start + i].name.clone();
-                return Err(Fault::NotFinite {
-                    variable,
-                    value: outputs[i],
-                    t,
-                });
+                return Err(Fault::NotFinite { variable, value: outputs[i], t });
             }
             *fresh |= bit;
         }
@@ -431,17 +381,7 @@ impl<M: Model> Instance<M> {
             });
         }
         self.tuned()?;
-        let State {
-            values,
-            model,
-            x,
-            discrete,
-            solver,
-            statistics,
-            guarded,
-            fresh,
-            ..
-        } = &mut self.state;
+        let State { values, model, x, discrete, solver, statistics, guarded, fresh, .. } = &mut self.state;
         let (Some(model), Some(solver)) = (model, solver) else {
             return Ok(());
         };
@@ -451,17 +391,7 @@ impl<M: Model> Instance<M> {
         let inputs = Layout::<M>::INPUTS;
         let u = &values[inputs.clone()];
         let duals = &mut self.duals[inputs];
-        model.with_system(Step {
-            from: now,
-            to,
-            u,
-            guard,
-            duals,
-            x,
-            d: discrete,
-            solver,
-            statistics,
-        })?;
+        model.with_system(Step { from: now, to, u, guard, duals, x, d: discrete, solver, statistics })?;
         *guarded = h;
         *fresh = 0;
         values[0] = to;
@@ -534,20 +464,10 @@ impl<M: Model> Instance<M> {
             needed |= self.table.access[*unknown as usize] & ALL_FRESH;
         }
         if let Some(s) = seed.iter().find(|s| !s.is_finite()) {
-            return Err(Fault::Argument {
-                argument: "seed",
-                value: *s,
-                allowed: "finite".into(),
-            });
+            return Err(Fault::Argument { argument: "seed", value: *s, allowed: "finite".into() });
         }
         self.tuned()?;
-        let State {
-            values,
-            model,
-            x,
-            discrete,
-            ..
-        } = &mut self.state;
+        let State { values, model, x, discrete, .. } = &mut self.state;
         let Some(model) = model else { return Ok(()) };
         let inputs = Layout::<M>::INPUTS;
         for i in inputs.clone() {
@@ -563,14 +483,7 @@ impl<M: Model> Instance<M> {
                 let (before, outputs) = self.duals.split_at_mut(range.start);
                 let (u, outputs) = (&before[inputs.clone()], &mut outputs[..range.len()]);
                 model
-                    .with_system(Evaluate {
-                        group,
-                        t,
-                        x,
-                        u,
-                        d: discrete,
-                        values: outputs,
-                    })
+                    .with_system(Evaluate { group, t, x, u, d: discrete, values: outputs })
                     .map_err(|source| Fault::Evaluation { t, source })?;
             }
         }
@@ -592,11 +505,7 @@ impl<M: Model> Instance<M> {
 
 /// Number of references and number of values must agree.
 pub(crate) fn same_length(references: usize, values: usize) -> Result<(), Fault> {
-    if references == values {
-        Ok(())
-    } else {
-        Err(Fault::Length { references, values })
-    }
+    if references == values { Ok(()) } else { Err(Fault::Length { references, values }) }
 }
 
 /// True if `value` may be set.

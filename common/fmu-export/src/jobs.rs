@@ -43,14 +43,7 @@ impl<M: Model, S: model::Scalar> Visitor<M> for Evaluate<'_, M, S> {
     type Output = Result<(), EvaluationError>;
     fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) -> Self::Output {
         let x: [S; N] = std::array::from_fn(|i| S::lift(self.x[i]));
-        system.evaluate(
-            self.group,
-            S::lift(self.t),
-            &x,
-            &M::Inputs::<S>::load(self.u),
-            self.d,
-            self.values,
-        )
+        system.evaluate(self.group, S::lift(self.t), &x, &M::Inputs::<S>::load(self.u), self.d, self.values)
     }
 }
 
@@ -129,32 +122,20 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
                 stable(&solver, (from, to), &eigenvalues.map(Complex::from))?;
             } // not finite: the first stage meets it and names the state
         }
-        let mut driven = Driven {
-            system,
-            u: M::Inputs::<f64>::load(u),
-            d: *self.d,
-        };
+        let mut driven = Driven { system, u: M::Inputs::<f64>::load(u), d: *self.d };
         let mut t = from;
         loop {
             driven.pass_events(t, &mut x, &mut solver);
             if t >= to {
                 break;
             }
-            let target = system
-                .next_event(&driven.d)
-                .filter(|event| *event < to)
-                .unwrap_or(to);
+            let target = system.next_event(&driven.d).filter(|event| *event < to).unwrap_or(to);
             if Z == 0 {
-                solver
-                    .advance(&driven, t, target, &mut x, &mut statistics)
-                    .map_err(fault)?;
+                solver.advance(&driven, t, target, &mut x, &mut statistics).map_err(fault)?;
                 t = target;
                 continue;
             }
-            match solver
-                .advance_until(&driven, &driven, t, target, &mut x, &mut statistics)
-                .map_err(fault)?
-            {
+            match solver.advance_until(&driven, &driven, t, target, &mut x, &mut statistics).map_err(fault)? {
                 Reached::End => t = target,
                 Reached::Event { t: at, .. } => {
                     t = at;

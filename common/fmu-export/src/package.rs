@@ -46,22 +46,10 @@ const PLATFORM: &str = match (cfg!(target_os = "windows"), cfg!(target_os = "mac
 /// [`PackError`].
 pub fn archive<M: Model>(library: &[u8], extension: &str) -> Result<Vec<u8>, PackError> {
     let mut files = [
-        (
-            format!("binaries/{PLATFORM}/{}.{extension}", M::NAME),
-            library.to_vec(),
-        ),
-        (
-            "documentation/licenses/license.spdx".into(),
-            b"MIT OR Apache-2.0\n".to_vec(),
-        ),
-        (
-            "documentation/licenses/LICENSE-APACHE".into(),
-            include_bytes!("../../../LICENSE-APACHE").to_vec(),
-        ),
-        (
-            "documentation/licenses/LICENSE-MIT".into(),
-            include_bytes!("../../../LICENSE-MIT").to_vec(),
-        ),
+        (format!("binaries/{PLATFORM}/{}.{extension}", M::NAME), library.to_vec()),
+        ("documentation/licenses/license.spdx".into(), b"MIT OR Apache-2.0\n".to_vec()),
+        ("documentation/licenses/LICENSE-APACHE".into(), include_bytes!("../../../LICENSE-APACHE").to_vec()),
+        ("documentation/licenses/LICENSE-MIT".into(), include_bytes!("../../../LICENSE-MIT").to_vec()),
         ("modelDescription.xml".into(), model_description::<M>()?),
     ];
     files.sort(); // the same order wherever it is built
@@ -78,10 +66,7 @@ pub fn archive<M: Model>(library: &[u8], extension: &str) -> Result<Vec<u8>, Pac
 }
 
 fn file<T>(path: &str, result: io::Result<T>) -> Result<T, PackError> {
-    result.map_err(|source| PackError::File {
-        path: path.into(),
-        source,
-    })
+    result.map_err(|source| PackError::File { path: path.into(), source })
 }
 
 fn command<M: Model>(arguments: &[String]) -> Result<(), PackError> {
@@ -89,10 +74,7 @@ fn command<M: Model>(arguments: &[String]) -> Result<(), PackError> {
     match arguments[..] {
         ["describe"] => Ok(io::stdout().lock().write_all(&model_description::<M>()?)?),
         ["pack", "--library", library, "--output", output] => {
-            let extension = Path::new(library)
-                .extension()
-                .and_then(|e| e.to_str())
-                .unwrap_or("so");
+            let extension = Path::new(library).extension().and_then(|e| e.to_str()).unwrap_or("so");
             let archive = archive::<M>(&file(library, fs::read(library))?, extension)?;
             if let Some(folder) = Path::new(output).parent() {
                 file(output, fs::create_dir_all(folder))?;

@@ -70,21 +70,12 @@ impl SolverParameters {
             other => return Err(Fault::MethodNotOffered { method: other as i64 }),
         };
         let Self { step, rtol, atol, .. } = *self;
-        Ok(Settings {
-            method,
-            step,
-            rtol,
-            atol,
-        })
+        Ok(Settings { method, step, rtol, atol })
     }
 }
 
 impl From<Statistics> for SolverCounters {
     fn from(s: Statistics) -> Self {
-        Self {
-            steps: s.steps,
-            rhs_evaluations: s.rhs_evaluations,
-            rejected: s.rejected,
-        }
+        Self { steps: s.steps, rhs_evaluations: s.rhs_evaluations, rejected: s.rejected }
     }
 }

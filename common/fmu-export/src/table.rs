@@ -81,15 +81,10 @@ impl Table {
     pub fn new<M: Model>() -> Self {
         let mut variables = Vec::with_capacity(Layout::<M>::COUNT);
         for section in Layout::<M>::SECTIONS {
-            variables.extend(section.iter().map(|entry| Variable {
-                name: entry.name(),
-                entry: *entry,
-            }));
+            variables.extend(section.iter().map(|entry| Variable { name: entry.name(), entry: *entry }));
         }
-        let mut access: Vec<u8> = variables
-            .iter()
-            .map(|v| if v.entry.kind == Kind::Float64 { FLOAT } else { 0 })
-            .collect();
+        let mut access: Vec<u8> =
+            variables.iter().map(|v| if v.entry.kind == Kind::Float64 { FLOAT } else { 0 }).collect();
         for group in Group::ALL {
             for a in &mut access[Layout::<M>::group(group)] {
                 *a |= 1 << group as u8;
@@ -112,10 +107,13 @@ impl Table {
     /// Value references of the inputs that an output depends on directly, ascending.
     pub(crate) fn dependencies(&self, output: usize) -> Vec<usize> {
         let depends = self.variables[output].entry.depends;
+        let component = self.variables[output].name.rsplit('.').next().unwrap_or_default();
         let covers = |name: &str| {
             depends.iter().any(|d| {
-                name.strip_prefix(d)
-                    .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+                if let Some(same) = d.strip_suffix('@') {
+                    return name.strip_prefix(same) == Some(component);
+                }
+                name.strip_prefix(d).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
             })
         };
         let is_input = |v: &Variable| v.entry.causality == Causality::Input;
@@ -142,14 +140,7 @@ impl Table {
             entry.depends.iter().for_each(|d| hash.write(d.as_bytes()));
         }
         let h = format!("{:032x}", hash.0);
-        format!(
-            "{{{}-{}-{}-{}-{}}}",
-            &h[..8],
-            &h[8..12],
-            &h[12..16],
-            &h[16..20],
-            &h[20..]
-        )
+        format!("{{{}-{}-{}-{}-{}}}", &h[..8], &h[8..12], &h[12..16], &h[16..20], &h[20..])
     }
 }
 
@@ -181,11 +172,7 @@ pub(crate) const fn kind_name(kind: Kind) -> &'static str {
 /// The allowed values of a variable, for a message.
 pub(crate) fn allowed(entry: &Entry) -> String {
     if let Kind::Enumeration(t) = entry.kind {
-        let items: Vec<_> = t
-            .items
-            .iter()
-            .map(|i| format!("{} ({})", i.name, i.value))
-            .collect();
+        let items: Vec<_> = t.items.iter().map(|i| format!("{} ({})", i.name, i.value)).collect();
         return items.join(", ");
     }
     let above = entry.min > 0.0 && entry.min <= f64::MIN_POSITIVE;

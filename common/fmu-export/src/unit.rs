@@ -44,10 +44,7 @@ impl BaseUnit {
 
     /// Attributes of the `BaseUnit` element: the exponents that are not zero.
     pub(crate) fn attributes(&self) -> impl Iterator<Item = (&'static str, String)> {
-        BASE.into_iter()
-            .zip(self.exponents)
-            .filter(|(_, e)| *e != 0)
-            .map(|(name, e)| (name, e.to_string()))
+        BASE.into_iter().zip(self.exponents).filter(|(_, e)| *e != 0).map(|(name, e)| (name, e.to_string()))
     }
 }
 

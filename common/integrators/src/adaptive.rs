@@ -34,34 +34,20 @@ struct Norm<const N: usize> {
 impl<const N: usize> Norm<N> {
     fn new<O: Ode<N>>(ode: &O, settings: &Settings) -> Self {
         let nominal = ode.nominal();
-        let counted = nominal
-            .iter()
-            .map(|n| if n.is_finite() { 1.0 } else { 0.0 })
-            .sum::<f64>()
-            .max(1.0);
-        Self {
-            nominal,
-            counted,
-            rtol: settings.rtol,
-            atol: settings.atol,
-        }
+        let counted = nominal.iter().map(|n| if n.is_finite() { 1.0 } else { 0.0 }).sum::<f64>().max(1.0);
+        Self { nominal, counted, rtol: settings.rtol, atol: settings.atol }
     }
 
     #[inline]
     fn scaled(&self, value: f64, i: usize, x: f64) -> f64 {
-        if self.nominal[i].is_finite() {
-            value / (self.atol * self.nominal[i] + self.rtol * x)
-        } else {
-            0.0
-        }
+        if self.nominal[i].is_finite() { value / (self.atol * self.nominal[i] + self.rtol * x) } else { 0.0 }
     }
 
     /// Root mean square of `values` against the larger of two states.
     #[inline]
     fn of(&self, values: &[f64; N], x: &[f64; N], x_new: &[f64; N]) -> f64 {
-        let sum: f64 = (0..N)
-            .map(|i| self.scaled(values[i], i, x[i].abs().max(x_new[i].abs())).powi(2))
-            .sum();
+        let sum: f64 =
+            (0..N).map(|i| self.scaled(values[i], i, x[i].abs().max(x_new[i].abs())).powi(2)).sum();
         (sum / self.counted).sqrt()
     }
 
@@ -85,13 +71,7 @@ pub(crate) fn adaptive<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
 ) -> Result<(), StepError<O::Error>> {
     let norm = Norm::new(ode, settings);
     let exponent = 1.0 / f64::from(method.order());
-    let control = Control {
-        method,
-        ode,
-        norm,
-        exponent,
-        t_end,
-    };
+    let control = Control { method, ode, norm, exponent, t_end };
     let mut slope = None;
     let mut trials = 0;
     while run.t < t_end {
@@ -109,29 +89,12 @@ pub(crate) fn adaptive<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
             memory.step = control.first_step(run, &from);
         }
         let wanted = memory.step.max(control.least_step(from.t));
-        let Accepted {
-            trial,
-            h,
-            error,
-            rejected,
-        } = control.accepted(run, &from, fit(wanted, remaining), &mut trials)?;
+        let Accepted { trial, h, error, rejected } =
+            control.accepted(run, &from, fit(wanted, remaining), &mut trials)?;
 
         let last = h >= remaining;
         let t = if last { t_end } else { from.t + h };
-        if W::WATCHES
-            && run.watch(
-                method,
-                ode,
-                &Taken {
-                    from: &from,
-                    trial: &trial,
-                    h,
-                    t,
-                    last,
-                },
-                watch,
-            )?
-        {
+        if W::WATCHES && run.watch(method, ode, &Taken { from: &from, trial: &trial, h, t, last }, watch)? {
             return Ok(());
         }
         let factor = control.factor(error) * memory.error.powf(BETA);
@@ -139,10 +102,7 @@ pub(crate) fn adaptive<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
         if !rejected && next >= h {
             next = next.max(wanted); // cut short by the end of the call, not by its error
         }
-        *memory = Memory {
-            step: next,
-            error: error.max(LEAST_ERROR),
-        };
+        *memory = Memory { step: next, error: error.max(LEAST_ERROR) };
         if !run.accept(ode, t, M::state(&trial))? {
             slope = method.slope(&trial).copied();
         }
@@ -196,11 +156,7 @@ impl<const N: usize, M: OneStep<N>, O: Ode<N>> Control<'_, N, M, O> {
         loop {
             *trials += 1;
             if *trials > MAX_STEPS {
-                return Err(StepError::TooManySteps {
-                    t,
-                    t_end: self.t_end,
-                    h,
-                });
+                return Err(StepError::TooManySteps { t, t_end: self.t_end, h });
             }
             let tried = self
                 .method
@@ -211,12 +167,7 @@ impl<const N: usize, M: OneStep<N>, O: Ode<N>> Control<'_, N, M, O> {
                     let errors = self.method.error(&trial, h);
                     let error = self.norm.of(&errors, &from.x, M::state(&trial));
                     if error <= 1.0 {
-                        return Ok(Accepted {
-                            trial,
-                            h,
-                            error,
-                            rejected,
-                        });
+                        return Ok(Accepted { trial, h, error, rejected });
                     }
                     #[allow(
                         clippy::manual_clamp,
@@ -224,15 +175,7 @@ impl<const N: usize, M: OneStep<N>, O: Ode<N>> Control<'_, N, M, O> {
                     )]
                     let shorter = h * self.factor(error).max(SHRINK).min(SAFETY);
                     let index = self.norm.worst(&errors, &from.x);
-                    (
-                        shorter,
-                        StepError::StepTooSmall {
-                            t,
-                            h: shorter,
-                            min,
-                            index,
-                        },
-                    )
+                    (shorter, StepError::StepTooSmall { t, h: shorter, min, index })
                 }
                 Err(reason) => (h * SHRINK, reason),
             };
@@ -255,12 +198,7 @@ impl<const N: usize, M: OneStep<N>, O: Ode<N>> Control<'_, N, M, O> {
         let remaining = self.t_end - t;
         let d_0 = self.norm.of(x, x, x);
         let d_1 = self.norm.of(slope, x, x);
-        let h_0 = if d_0 < 1e-5 || d_1 < 1e-5 {
-            1e-6
-        } else {
-            0.01 * d_0 / d_1
-        }
-        .min(remaining);
+        let h_0 = if d_0 < 1e-5 || d_1 < 1e-5 { 1e-6 } else { 0.01 * d_0 / d_1 }.min(remaining);
         let euler: [f64; N] = std::array::from_fn(|i| x[i] + h_0 * slope[i]);
         run.statistics.rhs_evaluations += 1;
         let Ok(turned) = self.ode.rhs(t + h_0, &euler) else {
@@ -269,11 +207,8 @@ impl<const N: usize, M: OneStep<N>, O: Ode<N>> Control<'_, N, M, O> {
         let change: [f64; N] = std::array::from_fn(|i| turned[i] - slope[i]);
         let d_2 = self.norm.of(&change, x, x) / h_0;
         let steepest = d_1.max(d_2);
-        let h_1 = if steepest <= 1e-15 {
-            (1e-3 * h_0).max(1e-6)
-        } else {
-            (0.01 / steepest).powf(self.exponent)
-        };
+        let h_1 =
+            if steepest <= 1e-15 { (1e-3 * h_0).max(1e-6) } else { (0.01 / steepest).powf(self.exponent) };
         let h = (100.0 * h_0).min(h_1).min(remaining);
         if h > 0.0 { h } else { h_0 } // not a number
     }

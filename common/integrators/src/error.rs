@@ -56,10 +56,7 @@ pub enum StepError<E> {
         index: usize,
     },
     /// The interval needs more than [`MAX_STEPS`](crate::MAX_STEPS) steps.
-    #[error(
-        "more than {} steps of {h:.3e} s needed from t = {t:.6} s to {t_end:.6} s",
-        crate::MAX_STEPS
-    )]
+    #[error("more than {} steps of {h:.3e} s needed from t = {t:.6} s to {t_end:.6} s", crate::MAX_STEPS)]
     TooManySteps {
         /// Where the steps ran out [s].
         t: f64,
@@ -85,9 +82,5 @@ pub(crate) fn all_finite<const N: usize, E>(t: f64, values: &[f64; N]) -> Result
         return Ok(());
     }
     let index = values.iter().position(|v| !v.is_finite()).unwrap_or(0);
-    Err(StepError::NotFinite {
-        t,
-        index,
-        value: values[index],
-    })
+    Err(StepError::NotFinite { t, index, value: values[index] })
 }

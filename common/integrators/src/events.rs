@@ -86,13 +86,7 @@ impl<'a, E, const M: usize> Monitor<'a, E, M> {
     where
         E: Indicators<N, M>,
     {
-        Self {
-            events,
-            band: events.band(),
-            sides: [None; M],
-            started: false,
-            which: None,
-        }
+        Self { events, band: events.band(), sides: [None; M], started: false, which: None }
     }
 
     fn values<const N: usize, F>(&self, t: f64, x: &[f64; N]) -> Result<[f64; M], StepError<F>>
@@ -101,11 +95,7 @@ impl<'a, E, const M: usize> Monitor<'a, E, M> {
     {
         let g = self.events.indicators(t, x);
         match g.iter().position(|v| !v.is_finite()) {
-            Some(index) => Err(StepError::IndicatorNotFinite {
-                t,
-                index,
-                value: g[index],
-            }),
+            Some(index) => Err(StepError::IndicatorNotFinite { t, index, value: g[index] }),
             None => Ok(g),
         }
     }
@@ -192,11 +182,7 @@ fn surround<F>(
     let backward = inner.1 < 0.0;
     let mut reach = (2.0 * inner.1.abs() / slope).max(width);
     loop {
-        let theta = if backward {
-            (guess - reach).max(limits[0])
-        } else {
-            (guess + reach).min(limits[1])
-        };
+        let theta = if backward { (guess - reach).max(limits[0]) } else { (guess + reach).min(limits[1]) };
         let value = f(theta)?;
         if (value < 0.0) != backward {
             return Ok(Some(if backward {
@@ -230,31 +216,21 @@ impl<const N: usize, const M: usize, E: Indicators<N, M>> Watch<N> for Monitor<'
         }
         self.started = true;
         let mut before = (0.0, self.margin(&g));
-        let mut theta = if self.sides.contains(&None) {
-            f64::from(FIRST_LOOK).exp2()
-        } else {
-            QUARTERS[0]
-        };
+        let mut theta = if self.sides.contains(&None) { f64::from(FIRST_LOOK).exp2() } else { QUARTERS[0] };
         loop {
             let x = step.at(theta);
             let g = self.values(step.t + theta * step.h, &x)?;
             self.take_sides(&g);
             let margin = self.margin(&g);
             if margin < 0.0 {
-                return self
-                    .locate(step, [before.0, theta], [before.1, margin], restep)
-                    .map(Some);
+                return self.locate(step, [before.0, theta], [before.1, margin], restep).map(Some);
             }
             if theta >= 1.0 {
                 let arrived = last && self.crossings(&g).iter().any(|c| *c != Crossing::None);
                 return Ok(arrived.then(|| self.stop(1.0, x, &g)));
             }
             before = (theta, margin);
-            theta = if theta < QUARTERS[0] {
-                2.0 * theta
-            } else {
-                theta + QUARTERS[0]
-            };
+            theta = if theta < QUARTERS[0] { 2.0 * theta } else { theta + QUARTERS[0] };
         }
     }
 }

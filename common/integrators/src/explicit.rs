@@ -93,13 +93,7 @@ impl<const N: usize, const S: usize> OneStep<N> for Tableau<S> {
             let weights: [f64; S] = std::array::from_fn(|i| self.dense[i][p]);
             combine(&[0.0; N], h, &weights, &trial.k)
         });
-        Dense {
-            t: from.t,
-            h,
-            start: from.x,
-            end: trial.x,
-            coefficients,
-        }
+        Dense { t: from.t, h, start: from.x, end: trial.x, coefficients }
     }
 }
 
@@ -120,11 +114,7 @@ mod tests {
     /// Quadrature conditions: `sum b_i c_i^q = 1/(q+1)` for q < order, and none by accident beyond.
     fn integrates_powers_of_time<const S: usize>(m: &Tableau<S>) {
         for q in 0..=m.order {
-            let sum: f64 =
-                m.b.iter()
-                    .zip(m.c)
-                    .map(|(b, c)| b * c.powi(q.cast_signed()))
-                    .sum();
+            let sum: f64 = m.b.iter().zip(m.c).map(|(b, c)| b * c.powi(q.cast_signed())).sum();
             let defect = (sum - 1.0 / f64::from(q + 1)).abs();
             assert_eq!(defect < ROUNDING, q < m.order, "q = {q}: {defect:e}");
         }
@@ -141,10 +131,7 @@ mod tests {
         for theta in [0.1, 0.5, 0.9] {
             for q in 0..order {
                 let sum: f64 = (0..S).map(|i| weight(i, theta) * m.c[i].powi(q)).sum();
-                assert!(
-                    (sum - theta.powi(q + 1) / f64::from(q + 1)).abs() < ROUNDING,
-                    "q = {q}"
-                );
+                assert!((sum - theta.powi(q + 1) / f64::from(q + 1)).abs() < ROUNDING, "q = {q}");
             }
         }
     }
@@ -165,12 +152,7 @@ mod tests {
     #[test]
     fn embedded_weights_of_dopri5_have_order_4() {
         for q in 0..4 {
-            let sum: f64 = DOPRI5
-                .error
-                .iter()
-                .zip(DOPRI5.c)
-                .map(|(e, c)| e * c.powi(q))
-                .sum();
+            let sum: f64 = DOPRI5.error.iter().zip(DOPRI5.c).map(|(e, c)| e * c.powi(q)).sum();
             assert!(sum.abs() < ROUNDING);
         }
     }

@@ -21,17 +21,9 @@ pub(crate) fn fixed<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
     let span = t_end - t_start;
     let steps = settings.inner_steps(span);
     if steps > f64::from(MAX_STEPS) {
-        return Err(StepError::TooManySteps {
-            t: t_start,
-            t_end,
-            h: settings.step,
-        });
+        return Err(StepError::TooManySteps { t: t_start, t_end, h: settings.step });
     }
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "from 1 to MAX_STEPS"
-    )]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 1 to MAX_STEPS")]
     let n = steps as u32;
     let h = span / steps;
     let mut slope = None;
@@ -48,13 +40,7 @@ pub(crate) fn fixed<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
         let t = if i == n { t_end } else { t_start + f64::from(i) * h };
         all_finite(t, M::state(&trial))?;
         if W::WATCHES {
-            let taken = Taken {
-                from: &from,
-                trial: &trial,
-                h,
-                t,
-                last: i == n,
-            };
+            let taken = Taken { from: &from, trial: &trial, h, t, last: i == n };
             if run.watch(method, ode, &taken, watch)? {
                 return Ok(());
             }

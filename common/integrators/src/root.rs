@@ -21,11 +21,7 @@ pub(crate) fn bracket<E>(
         let toward = (middle - secant).signum();
         let truncated = secant + toward * (kappa * (b - a).powi(2)).min((middle - secant).abs());
         let reach = allowed - 0.5 * (b - a);
-        let mut next = if (truncated - middle).abs() <= reach {
-            truncated
-        } else {
-            middle - toward * reach
-        };
+        let mut next = if (truncated - middle).abs() <= reach { truncated } else { middle - toward * reach };
         if !(a < next && next < b) {
             next = middle; // rounding
             if !(a < next && next < b) {

@@ -22,8 +22,7 @@ impl<const N: usize> Run<N> {
     #[inline]
     pub(crate) fn slope<O: Ode<N>>(&mut self, ode: &O) -> Result<[f64; N], StepError<O::Error>> {
         self.statistics.rhs_evaluations += 1;
-        ode.rhs(self.t, &self.x)
-            .map_err(|source| StepError::Rhs { t: self.t, source })
+        ode.rhs(self.t, &self.x).map_err(|source| StepError::Rhs { t: self.t, source })
     }
 
     /// Moves on to a new state and projects it; the result says whether the projection changed it.
@@ -37,9 +36,7 @@ impl<const N: usize> Run<N> {
         self.t = t;
         self.x = *x;
         self.statistics.steps += 1;
-        let changed = ode
-            .project(t, &mut self.x)
-            .map_err(|source| StepError::Rhs { t, source })?;
+        let changed = ode.project(t, &mut self.x).map_err(|source| StepError::Rhs { t, source })?;
         if changed {
             all_finite(t, &self.x)?;
         }
@@ -54,9 +51,7 @@ impl<const N: usize> Run<N> {
         taken: &Taken<N, M::Trial>,
         watch: &mut W,
     ) -> Result<bool, StepError<O::Error>> {
-        let Taken {
-            from, trial, h, t, ..
-        } = *taken;
+        let Taken { from, trial, h, t, .. } = *taken;
         let restep = |theta: f64| {
             let trial = method.step(ode, from, theta * h, &mut self.statistics.rhs_evaluations)?;
             Ok(*M::state(&trial))

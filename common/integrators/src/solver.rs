@@ -22,10 +22,7 @@ pub struct Memory {
 
 impl Default for Memory {
     fn default() -> Self {
-        Self {
-            step: 0.0,
-            error: 1e-4,
-        }
+        Self { step: 0.0, error: 1e-4 }
     }
 }
 
@@ -42,10 +39,7 @@ impl Solver {
     /// # Errors
     /// A step size or tolerance that is not finite and positive.
     pub fn new(settings: Settings) -> Result<Self, SettingsError> {
-        Ok(Self {
-            settings: settings.check()?,
-            memory: Memory::default(),
-        })
+        Ok(Self { settings: settings.check()?, memory: Memory::default() })
     }
 
     /// What the solver was made with.
@@ -86,8 +80,7 @@ impl Solver {
         x: &mut [f64; N],
         statistics: &mut Statistics,
     ) -> Result<(), StepError<O::Error>> {
-        self.run(ode, [t, t_end], x, statistics, &mut Unwatched)
-            .map(|_| ())
+        self.run(ode, [t, t_end], x, statistics, &mut Unwatched).map(|_| ())
     }
 
     /// As [`advance`](Self::advance), and shows the dense output of every accepted step to `each`.
@@ -103,8 +96,7 @@ impl Solver {
         statistics: &mut Statistics,
         each: impl FnMut(&Dense<N>),
     ) -> Result<(), StepError<O::Error>> {
-        self.run(ode, [t, t_end], x, statistics, &mut Show(each))
-            .map(|_| ())
+        self.run(ode, [t, t_end], x, statistics, &mut Show(each)).map(|_| ())
     }
 
     /// As [`advance`](Self::advance), but stops just after the first zero crossing of any indicator.
@@ -125,9 +117,7 @@ impl Solver {
     ) -> Result<Reached<M>, StepError<O::Error>> {
         let mut monitor = Monitor::new(events);
         let t = self.run(ode, [t, t_end], x, statistics, &mut monitor)?;
-        Ok(monitor
-            .which
-            .map_or(Reached::End, |which| Reached::Event { t, which }))
+        Ok(monitor.which.map_or(Reached::End, |which| Reached::Event { t, which }))
     }
 
     /// Works on copies and hands them over when all went well; the result is the time reached.
@@ -146,11 +136,7 @@ impl Solver {
         if t >= t_end {
             return Ok(t);
         }
-        let mut run = Run {
-            t,
-            x: *x,
-            statistics: *statistics,
-        };
+        let mut run = Run { t, x: *x, statistics: *statistics };
         let mut memory = self.memory;
         match self.settings.method {
             Method::Heun => fixed(&HEUN, &self.settings, ode, &mut run, t_end, watch)?,

@@ -54,10 +54,7 @@ impl Add for Complex {
 impl Mul for Complex {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
-        Self::new(
-            self.re * other.re - self.im * other.im,
-            self.re * other.im + self.im * other.re,
-        )
+        Self::new(self.re * other.re - self.im * other.im, self.re * other.im + self.im * other.re)
     }
 }
 
@@ -78,10 +75,7 @@ pub(crate) fn explicit<const S: usize>(method: &Tableau<S>, z: Complex) -> Compl
         coefficient
     });
     let one = Complex::new(1.0, 0.0);
-    one + z * coefficients
-        .iter()
-        .rev()
-        .fold(Complex::default(), |sum, c| Complex::new(*c, 0.0) + z * sum)
+    one + z * coefficients.iter().rev().fold(Complex::default(), |sum, c| Complex::new(*c, 0.0) + z * sum)
 }
 
 /// Whether a step of `h` makes the mode `lambda` grow by more than [`MAX_AMPLIFICATION`].
@@ -99,10 +93,7 @@ pub fn violates(method: Method, h: f64, lambda: Complex) -> bool {
 /// finite.
 #[must_use]
 pub fn largest_stable_step(method: Method, eigenvalues: &[Complex]) -> f64 {
-    eigenvalues
-        .iter()
-        .map(|&lambda| largest_for(method, lambda))
-        .fold(f64::INFINITY, f64::min)
+    eigenvalues.iter().map(|&lambda| largest_for(method, lambda)).fold(f64::INFINITY, f64::min)
 }
 
 fn largest_for(method: Method, lambda: Complex) -> f64 {

@@ -34,14 +34,9 @@ impl Ode<2> for Rotation {
 }
 
 fn run(method: Method, projects: bool, tolerance: f64) -> (Rotation, Statistics, [f64; 2]) {
-    let ode = Rotation {
-        projects,
-        ..Rotation::default()
-    };
+    let ode = Rotation { projects, ..Rotation::default() };
     let (mut x, mut statistics) = ([1.0, 0.0], Statistics::default());
-    solver(method, 0.1, tolerance)
-        .advance(&ode, 0.0, 3.0, &mut x, &mut statistics)
-        .expect("linear problem");
+    solver(method, 0.1, tolerance).advance(&ode, 0.0, 3.0, &mut x, &mut statistics).expect("linear problem");
     (ode, statistics, x)
 }
 
@@ -50,14 +45,7 @@ fn fixed_steps_cost_two_and_four_evaluations() {
     for (method, stages) in [(Method::Heun, 2), (Method::Rk4, 4)] {
         assert_eq!(u64::from(method.stages()), stages);
         let (ode, statistics, _) = run(method, false, 1.0);
-        assert_eq!(
-            statistics,
-            Statistics {
-                steps: 30,
-                rejected: 0,
-                rhs_evaluations: 30 * stages
-            }
-        );
+        assert_eq!(statistics, Statistics { steps: 30, rejected: 0, rhs_evaluations: 30 * stages });
         assert_eq!(ode.evaluations.get(), 30 * stages);
     }
 }
@@ -67,10 +55,7 @@ fn fixed_steps_cost_two_and_four_evaluations() {
 fn dopri5_reuses_its_last_stage() {
     let (ode, statistics, _) = run(Method::Dopri5, false, 1e-8);
     assert!(statistics.steps > 10);
-    assert_eq!(
-        statistics.rhs_evaluations,
-        2 + 6 * (statistics.steps + statistics.rejected)
-    );
+    assert_eq!(statistics.rhs_evaluations, 2 + 6 * (statistics.steps + statistics.rejected));
     assert_eq!(ode.evaluations.get(), statistics.rhs_evaluations);
 }
 
@@ -95,15 +80,9 @@ fn projection_is_called_once_per_accepted_step() {
 /// `n = max(1, ceil(H/step - 1e-9))`: host steps that differ from a multiple in the last bits do not cost a step.
 #[test]
 fn step_count_forgives_rounding() {
-    for (span, steps) in [
-        (0.1, 1),
-        (0.1 + 1e-13, 1),
-        (0.1 + 1e-8, 2),
-        (0.05, 1),
-        (1e-9, 1),
-        (0.3, 3),
-        (1.6, 16),
-    ] {
+    for (span, steps) in
+        [(0.1, 1), (0.1 + 1e-13, 1), (0.1 + 1e-8, 2), (0.05, 1), (1e-9, 1), (0.3, 3), (1.6, 16)]
+    {
         let (mut x, mut statistics) = ([1.0, 0.0], Statistics::default());
         let ode = Linear::OSCILLATOR;
         solver(Method::Heun, 0.1, 1.0)
@@ -129,14 +108,9 @@ fn empty_interval_costs_nothing() {
 fn rejections_are_counted() {
     let orbit = Kepler { e: 0.9 };
     let (mut x, mut statistics) = (orbit.exact(0.0), Statistics::default());
-    solver(Method::Dopri5, 1.0, 1e-6)
-        .advance(&orbit, 0.0, 12.0, &mut x, &mut statistics)
-        .expect("smooth");
+    solver(Method::Dopri5, 1.0, 1e-6).advance(&orbit, 0.0, 12.0, &mut x, &mut statistics).expect("smooth");
     assert!(statistics.rejected > 0);
-    assert_eq!(
-        statistics.rhs_evaluations,
-        2 + 6 * (statistics.steps + statistics.rejected)
-    );
+    assert_eq!(statistics.rhs_evaluations, 2 + 6 * (statistics.steps + statistics.rejected));
 }
 
 /// The step size of one call starts the next one: short calls cost one step each and no guess after the first.
@@ -145,23 +119,16 @@ fn proposal_lives_on_between_calls() {
     let ode = Linear::OSCILLATOR;
     let (mut x, mut statistics) = ([1.0, 0.0], Statistics::default());
     let mut solver = solver(Method::Dopri5, 1.0, 1e-6);
-    solver
-        .advance(&ode, 0.0, 10.0, &mut x, &mut statistics)
-        .expect("linear");
+    solver.advance(&ode, 0.0, 10.0, &mut x, &mut statistics).expect("linear");
     let natural = solver.memory().step;
     let before = statistics;
     for i in 0..100 {
         let t = 10.0 + 0.01 * f64::from(i);
-        solver
-            .advance(&ode, t, t + 0.01, &mut x, &mut statistics)
-            .expect("linear");
+        solver.advance(&ode, t, t + 0.01, &mut x, &mut statistics).expect("linear");
     }
     assert_eq!(statistics.steps - before.steps, 100);
     assert_eq!(statistics.rhs_evaluations - before.rhs_evaluations, 700);
-    assert!(
-        solver.memory().step >= natural,
-        "a short call does not shrink the proposal"
-    );
+    assert!(solver.memory().step >= natural, "a short call does not shrink the proposal");
     assert!(distance(&x, &ode.exact(11.0, &[1.0, 0.0])) < 20.0 * 1e-6); // one tolerance per step
 }
 
@@ -176,9 +143,7 @@ fn last_steps_are_balanced() {
                 steps.push(step.h);
             })
             .expect("linear");
-        let [.., one, other] = steps[..] else {
-            panic!("at least two steps")
-        };
+        let [.., one, other] = steps[..] else { panic!("at least two steps") };
         assert!((one - other).abs() < 1e-12 || other >= one, "{steps:?}");
         assert!((steps.iter().sum::<f64>() - t_end).abs() < 1e-12);
     }
@@ -200,20 +165,11 @@ fn event_location_is_counted() {
         let (mut x, mut statistics) = ([1.0, 0.0], Statistics::default());
         let reached =
             solver(method, 0.1, 1e-9).advance_until(&ode, &Height, 0.0, 3.0, &mut x, &mut statistics);
-        assert!(matches!(
-            reached,
-            Ok(Reached::Event {
-                which: [Crossing::Falling],
-                ..
-            })
-        ));
+        assert!(matches!(reached, Ok(Reached::Event { which: [Crossing::Falling], .. })));
         assert_eq!(ode.evaluations.get(), statistics.rhs_evaluations);
         assert_eq!(ode.projections.get(), statistics.steps);
         let least = u64::from(method.stages()) * statistics.steps;
-        eprintln!(
-            "{method:?}: {} evaluations, {least} without the event",
-            statistics.rhs_evaluations
-        );
+        eprintln!("{method:?}: {} evaluations, {least} without the event", statistics.rhs_evaluations);
         // the root is known from the dense output: a handful of repeated steps narrows it to the resolution of time
         assert!(statistics.rhs_evaluations <= least + 12 * u64::from(method.stages()));
     }

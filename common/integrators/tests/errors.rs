@@ -18,11 +18,7 @@ struct Strut;
 impl Ode<1> for Strut {
     type Error = NoStrut;
     fn rhs(&self, _t: f64, x: &[f64; 1]) -> Result<[f64; 1], NoStrut> {
-        if x[0] > 0.0 {
-            Ok([-1.0])
-        } else {
-            Err(NoStrut(x[0]))
-        }
+        if x[0] > 0.0 { Ok([-1.0]) } else { Err(NoStrut(x[0])) }
     }
 }
 
@@ -56,31 +52,16 @@ fn failure<const N: usize, O: Ode<N>>(
 where
     O::Error: std::fmt::Debug,
 {
-    let before = (
-        x,
-        Statistics {
-            steps: 3,
-            rejected: 2,
-            rhs_evaluations: 1,
-        },
-        *solver,
-    );
+    let before = (x, Statistics { steps: 3, rejected: 2, rhs_evaluations: 1 }, *solver);
     let (mut x, mut statistics, _) = before;
-    let error = solver
-        .advance(ode, t, t_end, &mut x, &mut statistics)
-        .expect_err("must fail");
+    let error = solver.advance(ode, t, t_end, &mut x, &mut statistics).expect_err("must fail");
     assert_eq!((x, statistics, *solver), before);
     error
 }
 
 #[test]
 fn settings_must_be_finite_and_positive() {
-    let good = Settings {
-        method: Method::Dopri5,
-        step: 0.1,
-        rtol: 1e-6,
-        atol: 1e-9,
-    };
+    let good = Settings { method: Method::Dopri5, step: 0.1, rtol: 1e-6, atol: 1e-9 };
     assert!(Solver::new(good).is_ok());
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         for (settings, name) in [
@@ -93,22 +74,14 @@ fn settings_must_be_finite_and_positive() {
         }
     }
     let message = Solver::new(Settings { rtol: -1.0, ..good }).map_err(|e| e.to_string());
-    assert_eq!(
-        message,
-        Err("solver rtol is -1; it must be finite and greater than 0".into())
-    );
+    assert_eq!(message, Err("solver rtol is -1; it must be finite and greater than 0".into()));
 }
 
 #[test]
 fn interval_must_go_forward() {
     for method in Method::ALL {
         for [t, t_end] in [[1.0, 0.5], [f64::NAN, 1.0], [0.0, f64::NAN], [0.0, f64::INFINITY]] {
-            let error = failure(
-                &mut solver(method, 0.1, 1e-6),
-                &Linear::OSCILLATOR,
-                [t, t_end],
-                [1.0, 0.0],
-            );
+            let error = failure(&mut solver(method, 0.1, 1e-6), &Linear::OSCILLATOR, [t, t_end], [1.0, 0.0]);
             assert!(matches!(error, StepError::Interval { .. }), "{error:?}");
         }
     }
@@ -118,13 +91,7 @@ fn interval_must_go_forward() {
 #[test]
 fn fixed_steps_return_the_error_of_the_model() {
     let error = failure(&mut solver(Method::Heun, 0.25, 1.0), &Strut, [0.0, 2.0], [0.5]);
-    assert_eq!(
-        error,
-        StepError::Rhs {
-            t: 0.5,
-            source: NoStrut(0.0)
-        }
-    );
+    assert_eq!(error, StepError::Rhs { t: 0.5, source: NoStrut(0.0) });
     assert_eq!(error.to_string(), "at t = 0.500000 s: strut of length 0 m");
 }
 
@@ -135,23 +102,11 @@ fn adaptive_steps_shrink_at_an_error_of_the_model() {
     let mut solver = solver(Method::Dopri5, 1.0, 1e-6);
     let (mut x, mut statistics) = ([0.5], Statistics::default());
     // a proposal that leads across the edge, over an interval that ends before it: no error
-    solver.restore(Memory {
-        step: 10.0,
-        error: 1e-4,
-    });
-    assert_eq!(
-        solver.advance(&Strut, 0.0, 0.499, &mut x, &mut statistics),
-        Ok(())
-    );
+    solver.restore(Memory { step: 10.0, error: 1e-4 });
+    assert_eq!(solver.advance(&Strut, 0.0, 0.499, &mut x, &mut statistics), Ok(()));
     assert!((x[0] - 0.001).abs() < 1e-15);
     let error = failure(&mut solver, &Strut, [0.499, 2.0], x);
-    let StepError::Rhs {
-        t,
-        source: NoStrut(length),
-    } = error
-    else {
-        panic!("{error:?}")
-    };
+    let StepError::Rhs { t, source: NoStrut(length) } = error else { panic!("{error:?}") };
     assert!((t - 0.5).abs() < 1e-14 && length.abs() < 1e-14, "{error:?}");
 }
 
@@ -160,13 +115,7 @@ fn adaptive_steps_shrink_at_an_error_of_the_model() {
 fn an_error_at_the_start_is_returned_at_once() {
     for method in Method::ALL {
         let error = failure(&mut solver(method, 0.1, 1e-6), &Strut, [1.0, 2.0], [-0.5]);
-        assert_eq!(
-            error,
-            StepError::Rhs {
-                t: 1.0,
-                source: NoStrut(-0.5)
-            }
-        );
+        assert_eq!(error, StepError::Rhs { t: 1.0, source: NoStrut(-0.5) });
     }
 }
 
@@ -175,9 +124,7 @@ fn an_error_at_the_start_is_returned_at_once() {
 fn fixed_steps_name_the_state_that_is_not_finite() {
     for method in [Method::Heun, Method::Rk4] {
         let error = failure(&mut solver(method, 0.01, 1.0), &BlowUp, [0.0, 2.0], [1.0, 1.0]);
-        let StepError::NotFinite { t, index: 1, value } = error else {
-            panic!("{error:?}")
-        };
+        let StepError::NotFinite { t, index: 1, value } = error else { panic!("{error:?}") };
         assert!(t > 1.0 && t < 1.2 && !value.is_finite(), "{error:?}"); // the pole is at t = 1
     }
 }
@@ -185,15 +132,8 @@ fn fixed_steps_name_the_state_that_is_not_finite() {
 /// An adaptive method follows the solution up to its pole; the message names time and state.
 #[test]
 fn adaptive_steps_stop_before_a_pole() {
-    let error = failure(
-        &mut solver(Method::Dopri5, 1.0, 1e-6),
-        &BlowUp,
-        [0.0, 2.0],
-        [1.0, 1.0],
-    );
-    let StepError::StepTooSmall { t, h, min, index: 1 } = error else {
-        panic!("{error:?}")
-    };
+    let error = failure(&mut solver(Method::Dopri5, 1.0, 1e-6), &BlowUp, [0.0, 2.0], [1.0, 1.0]);
+    let StepError::StepTooSmall { t, h, min, index: 1 } = error else { panic!("{error:?}") };
     assert!((t - 1.0).abs() < 1e-5 && h < min, "{error:?}"); // the pole moves with the tolerance
     assert!(error.to_string().ends_with("stiffest state: 1"), "{error}");
 }
@@ -221,20 +161,8 @@ fn a_slope_that_is_not_a_number_is_never_passed_on() {
 /// A tiny step size or a very stiff problem ends in an error and not in a hang.
 #[test]
 fn too_many_steps_are_refused_before_the_first() {
-    let error = failure(
-        &mut solver(Method::Heun, 1e-300, 1.0),
-        &Linear::OSCILLATOR,
-        [0.0, 1.0],
-        [1.0, 0.0],
-    );
-    assert_eq!(
-        error,
-        StepError::TooManySteps {
-            t: 0.0,
-            t_end: 1.0,
-            h: 1e-300
-        }
-    );
+    let error = failure(&mut solver(Method::Heun, 1e-300, 1.0), &Linear::OSCILLATOR, [0.0, 1.0], [1.0, 0.0]);
+    assert_eq!(error, StepError::TooManySteps { t: 0.0, t_end: 1.0, h: 1e-300 });
     assert_eq!(
         error.to_string(),
         format!("more than {MAX_STEPS} steps of 1.000e-300 s needed from t = 0.000000 s to 1.000000 s")
@@ -256,14 +184,8 @@ fn an_indicator_that_is_not_a_number_is_refused() {
         let mut solver = solver(method, 0.1, 1e-6);
         let before = solver;
         let error = solver.advance_until(&Linear::OSCILLATOR, &Undefined, 0.0, 1.0, &mut x, &mut statistics);
-        assert!(
-            matches!(error, Err(StepError::IndicatorNotFinite { index: 1, .. })),
-            "{error:?}"
-        );
-        assert_eq!(
-            (x, statistics, solver),
-            ([1.0, 0.0], Statistics::default(), before)
-        );
+        assert!(matches!(error, Err(StepError::IndicatorNotFinite { index: 1, .. })), "{error:?}");
+        assert_eq!((x, statistics, solver), ([1.0, 0.0], Statistics::default(), before));
     }
 }
 
@@ -286,13 +208,7 @@ fn a_failing_projection_fails_the_call() {
     for method in Method::ALL {
         let mut solver = solver(method, 1.0, 1e-6);
         let error = failure(&mut solver, &Projected(Err(NoStrut(0.0))), [0.0, 1.0], [0.0]);
-        assert!(matches!(
-            error,
-            StepError::Rhs {
-                source: NoStrut(_),
-                ..
-            }
-        ));
+        assert!(matches!(error, StepError::Rhs { source: NoStrut(_), .. }));
         let error = failure(&mut solver, &Projected(Ok(f64::INFINITY)), [0.0, 1.0], [0.0]);
         assert!(matches!(error, StepError::NotFinite { index: 0, .. }));
     }

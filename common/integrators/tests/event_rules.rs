@@ -14,18 +14,10 @@ fn earliest_event_wins() {
     let events = When(|t: f64, x: &[f64; 1]| [0.9 - x[0], x[0] - 0.3, 0.31 - t, 0.1 - t]);
     for method in Method::ALL {
         let mut x = [0.0];
-        let (t, which) = event(until(
-            &mut solver(method, 10.0, 1e-6),
-            &Drift(1.0),
-            &events,
-            [0.2, 2.0],
-            &mut x,
-        ));
+        let (t, which) =
+            event(until(&mut solver(method, 10.0, 1e-6), &Drift(1.0), &events, [0.2, 2.0], &mut x));
         assert!((t - 0.31).abs() < 1e-14);
-        assert_eq!(
-            which,
-            [Crossing::None, Crossing::None, Crossing::Falling, Crossing::None]
-        );
+        assert_eq!(which, [Crossing::None, Crossing::None, Crossing::Falling, Crossing::None]);
     }
 }
 
@@ -38,22 +30,11 @@ fn simultaneous_events_come_together() {
         let mut solver = solver(method, 0.1, 1e-6);
         let (t, which) = event(until(&mut solver, &Drift(1.0), &events, [0.0, 2.0], &mut x));
         assert!((t - 0.7).abs() < 1e-3); // the cube is within its band from 0.7 - 4.6e-4 on
-        assert_eq!(
-            which,
-            [
-                Crossing::Rising,
-                Crossing::Falling,
-                Crossing::Rising,
-                Crossing::None
-            ]
-        );
+        assert_eq!(which, [Crossing::Rising, Crossing::Falling, Crossing::Rising, Crossing::None]);
         // and only once
         let (t, which) = event(until(&mut solver, &Drift(1.0), &events, [t, 2.0], &mut x));
         assert!((t - 0.701).abs() < 1e-14);
-        assert_eq!(
-            which,
-            [Crossing::None, Crossing::None, Crossing::None, Crossing::Falling]
-        );
+        assert_eq!(which, [Crossing::None, Crossing::None, Crossing::None, Crossing::Falling]);
     }
 }
 
@@ -67,28 +48,14 @@ fn start_at_zero_is_no_event() {
                 // thrown up: back at 2 v / g, also when that is a small part of the step
                 for speed in [4.0, 0.01] {
                     let mut x = [offset, speed];
-                    let (t, which) = event(until(
-                        &mut solver(method, step, 1e-9),
-                        &Fall,
-                        &ground,
-                        [0.0, 2.0],
-                        &mut x,
-                    ));
-                    assert!(
-                        (t - 2.0 * speed / G).abs() < 1e-13 + 2e-13 / speed,
-                        "{method:?}: {t:e}"
-                    );
+                    let (t, which) =
+                        event(until(&mut solver(method, step, 1e-9), &Fall, &ground, [0.0, 2.0], &mut x));
+                    assert!((t - 2.0 * speed / G).abs() < 1e-13 + 2e-13 / speed, "{method:?}: {t:e}");
                     assert_eq!(which, [Crossing::Falling]);
                 }
                 // let fall: leaves downwards and stays there
                 let mut x = [offset, 0.0];
-                let reached = until(
-                    &mut solver(method, step, 1e-9),
-                    &Fall,
-                    &ground,
-                    [0.0, 1.0],
-                    &mut x,
-                );
+                let reached = until(&mut solver(method, step, 1e-9), &Fall, &ground, [0.0, 1.0], &mut x);
                 assert_eq!(reached, Reached::End);
             }
         }
@@ -107,14 +74,7 @@ fn no_event_comes_twice() {
                 Reached::End => break,
                 Reached::Event { t: at, which } => {
                     let falling = times.len() % 2 == 0;
-                    assert_eq!(
-                        which,
-                        [if falling {
-                            Crossing::Falling
-                        } else {
-                            Crossing::Rising
-                        }]
-                    );
+                    assert_eq!(which, [if falling { Crossing::Falling } else { Crossing::Rising }]);
                     times.push(at);
                     t = at;
                 }
@@ -145,10 +105,7 @@ fn event_at_the_end_of_a_call_is_seen_once() {
                         }
                     }
                 }
-                assert!(
-                    seen.len() == 1 && (seen[0] - 0.5).abs() < 1e-10,
-                    "{method:?} {offset:e}: {seen:?}"
-                );
+                assert!(seen.len() == 1 && (seen[0] - 0.5).abs() < 1e-10, "{method:?} {offset:e}: {seen:?}");
             }
         }
     }
@@ -160,13 +117,7 @@ fn touching_is_no_event() {
     for method in Method::ALL {
         let mut x = [0.0];
         let touch = When(|t: f64, _: &[f64; 1]| [(t - 0.5).powi(2)]);
-        let reached = until(
-            &mut solver(method, 0.125, 1e-6),
-            &Drift(1.0),
-            &touch,
-            [0.0, 1.0],
-            &mut x,
-        );
+        let reached = until(&mut solver(method, 0.125, 1e-6), &Drift(1.0), &touch, [0.0, 1.0], &mut x);
         assert_eq!(reached, Reached::End);
         assert!((x[0] - 1.0).abs() < 1e-15);
     }
@@ -198,10 +149,7 @@ fn indicators_do_not_disturb_the_run() {
         let (mut s, mut r) = (Statistics::default(), Statistics::default());
         let mut one = solver(method, 0.01, 1e-7);
         let mut other = one;
-        assert_eq!(
-            one.advance_until(&orbit, &never, 0.0, 7.0, &mut x, &mut s),
-            Ok(Reached::End)
-        );
+        assert_eq!(one.advance_until(&orbit, &never, 0.0, 7.0, &mut x, &mut s), Ok(Reached::End));
         assert_eq!(other.advance(&orbit, 0.0, 7.0, &mut y, &mut r), Ok(()));
         assert_eq!((x.map(f64::to_bits), s, one), (y.map(f64::to_bits), r, other));
     }
@@ -228,13 +176,8 @@ fn projection_across_zero_is_seen() {
     // Heun's step of 0.5 leaves the radius at sqrt(1 + h^4/4) = 1.0078: outside 1.004, and back after the projection
     let outside = When(|_, x: &[f64; 2]| [1.004 - x[0].hypot(x[1])]);
     let mut x = [1.0, 0.0];
-    let mut solver = Solver::new(Settings {
-        method: Method::Heun,
-        step: 0.5,
-        rtol: 1.0,
-        atol: 1.0,
-    })
-    .expect("valid");
+    let mut solver =
+        Solver::new(Settings { method: Method::Heun, step: 0.5, rtol: 1.0, atol: 1.0 }).expect("valid");
     let (t, which) = event(until(&mut solver, &Circle, &outside, [0.0, 2.0], &mut x));
     assert!(t > 0.0 && t < 0.5);
     assert_eq!(which, [Crossing::Falling]);

@@ -17,21 +17,12 @@ fn projectile_lands_on_time() {
             for start in [0.0, 1000.0] {
                 let mut x = [2.0, 3.0];
                 let ground = When(|_, x: &[f64; 2]| [x[0]]);
-                let reached = until(
-                    &mut solver(method, step, 1e-9),
-                    &Fall,
-                    &ground,
-                    [start, start + 5.0],
-                    &mut x,
-                );
+                let reached =
+                    until(&mut solver(method, step, 1e-9), &Fall, &ground, [start, start + 5.0], &mut x);
                 let (t, which) = event(reached);
                 // rounding of the height, and of time at 1000 s; both over the speed of 7 m/s
                 let bound = 1e-13 + 4.0 * f64::EPSILON * start;
-                assert!(
-                    (t - start - landing).abs() < bound,
-                    "{method:?} {step}: {:e}",
-                    t - start - landing
-                );
+                assert!((t - start - landing).abs() < bound, "{method:?} {step}: {:e}", t - start - landing);
                 assert_eq!(which, [Crossing::Falling]);
                 assert!(x[0] <= 0.0 && x[0] > -1e-10, "just below the ground: {:e}", x[0]);
             }
@@ -52,11 +43,7 @@ fn ball_bounces_in_geometric_progression() {
                 let ground = When(|_, x: &[f64; 2]| [x[0]]);
                 (t, _) = event(until(&mut solver, &Fall, &ground, [t, 10.0], &mut x));
                 // each landing adds rounding in speed, felt as long as the ball flies
-                assert!(
-                    (t - expected).abs() < 1e-12,
-                    "bounce {bounce}: {:e}",
-                    t - expected
-                );
+                assert!((t - expected).abs() < 1e-12, "bounce {bounce}: {:e}", t - expected);
                 x[1] *= -e;
                 flight *= e;
                 expected += flight;
@@ -103,13 +90,8 @@ fn event_times_follow_the_tolerance() {
     for tolerance in [1e-6, 1e-8, 1e-10] {
         let mut x = orbit.exact(0.0);
         let apocentre = When(|_, x: &[f64; 4]| [x[1]]); // half a turn
-        let reached = until(
-            &mut solver(Method::Dopri5, 1.0, tolerance),
-            &orbit,
-            &apocentre,
-            [0.0, 6.0],
-            &mut x,
-        );
+        let reached =
+            until(&mut solver(Method::Dopri5, 1.0, tolerance), &orbit, &apocentre, [0.0, 6.0], &mut x);
         let (t, which) = event(reached);
         assert_eq!(which, [Crossing::Falling]);
         assert!((t - std::f64::consts::PI).abs() < 100.0 * tolerance, "{t}"); // some ten steps, growing along the track

@@ -55,9 +55,7 @@ fn error_of_dopri5_is_proportional_to_the_tolerance() {
             let tolerance = 1e-4 * 0.1_f64.powi(i);
             let (mut x, mut statistics) = (orbit.exact(0.0), Statistics::default());
             let mut solver = solver(Method::Dopri5, 1.0, tolerance);
-            solver
-                .advance(&orbit, 0.0, t_end, &mut x, &mut statistics)
-                .expect("smooth problem");
+            solver.advance(&orbit, 0.0, t_end, &mut x, &mut statistics).expect("smooth problem");
             let error = distance(&x, &orbit.exact(t_end));
             // neighbouring orbits part along the track by up to 3 pi times the error in the axis per turn, and some
             // thirty steps add up
@@ -74,11 +72,9 @@ fn error_of_dopri5_is_proportional_to_the_tolerance() {
 #[test]
 fn dense_output_keeps_the_order() {
     let orbit = Kepler { e: 0.3 };
-    for (method, steps, order) in [
-        (Method::Heun, 200, 2.0),
-        (Method::Rk4, 100, 4.0),
-        (Method::Dopri5, 40, 5.0),
-    ] {
+    for (method, steps, order) in
+        [(Method::Heun, 200, 2.0), (Method::Rk4, 100, 4.0), (Method::Dopri5, 40, 5.0)]
+    {
         let errors = HALVINGS.map(|k| {
             let n = k * steps;
             let (mut x, mut statistics) = (orbit.exact(0.0), Statistics::default());
@@ -129,13 +125,7 @@ fn local_order_of_dense_output() {
 #[test]
 fn energy_loss_of_rk4_on_a_pendulum_has_order_5() {
     let losses = HALVINGS.map(|k| {
-        let end = in_calls(
-            &mut fixed(Method::Rk4, 1.0),
-            &Pendulum,
-            [0.0, 20.0],
-            200 * k,
-            [1.0, 0.0],
-        );
+        let end = in_calls(&mut fixed(Method::Rk4, 1.0), &Pendulum, [0.0, 20.0], 200 * k, [1.0, 0.0]);
         Pendulum::energy(&[1.0, 0.0]) - Pendulum::energy(&end)
     });
     assert!(losses.iter().all(|loss| *loss > 0.0), "{losses:?}");
@@ -173,38 +163,14 @@ impl Ode<4> for Arenstorf {
 ///
 /// Position published at that tolerance, and the same at 1e-17.
 const PUBLISHED: [([f64; 2], [f64; 2]); 8] = [
-    (
-        [-0.579_878_141_1, 0.609_077_525_1],
-        [-0.579_876_723_2, 0.609_078_355_5],
-    ),
-    (
-        [-0.198_333_527_0, 1.137_638_086],
-        [-0.198_332_883_2, 1.137_637_824],
-    ),
-    (
-        [-0.473_574_394_3, 0.223_906_811_8],
-        [-0.473_574_310_8, 0.223_907_792_9],
-    ),
-    (
-        [-1.174_553_350, -0.275_946_698_2],
-        [-1.174_553_507, -0.275_945_077_0],
-    ),
-    (
-        [-0.839_807_346_6, 0.446_830_226_8],
-        [-0.839_807_166_3, 0.446_831_417_1],
-    ),
-    (
-        [0.013_147_124_68, -0.838_575_149_9],
-        [0.013_143_772_69, -0.838_574_701_9],
-    ),
-    (
-        [-0.603_112_950_4, -0.991_259_803_1],
-        [-0.603_116_276_1, -0.991_258_527_7],
-    ),
-    (
-        [0.242_711_099_9, -0.389_994_883_3],
-        [0.242_704_437_6, -0.389_999_121_5],
-    ),
+    ([-0.579_878_141_1, 0.609_077_525_1], [-0.579_876_723_2, 0.609_078_355_5]),
+    ([-0.198_333_527_0, 1.137_638_086], [-0.198_332_883_2, 1.137_637_824]),
+    ([-0.473_574_394_3, 0.223_906_811_8], [-0.473_574_310_8, 0.223_907_792_9]),
+    ([-1.174_553_350, -0.275_946_698_2], [-1.174_553_507, -0.275_945_077_0]),
+    ([-0.839_807_346_6, 0.446_830_226_8], [-0.839_807_166_3, 0.446_831_417_1]),
+    ([0.013_147_124_68, -0.838_575_149_9], [0.013_143_772_69, -0.838_574_701_9]),
+    ([-0.603_112_950_4, -0.991_259_803_1], [-0.603_116_276_1, -0.991_258_527_7]),
+    ([0.242_711_099_9, -0.389_994_883_3], [0.242_704_437_6, -0.389_999_121_5]),
 ];
 
 /// Positions at t = 2, 4, .. 16 and the end.
@@ -228,22 +194,11 @@ fn arenstorf(tolerance: f64) -> (Vec<[f64; 2]>, [f64; 2], Statistics) {
 #[test]
 fn arenstorf_orbit_runs_as_published() {
     let (found, _, statistics) = arenstorf(1e-7);
-    assert_eq!(
-        statistics,
-        Statistics {
-            steps: 216,
-            rejected: 22 + 2,
-            rhs_evaluations: 1442
-        }
-    );
+    assert_eq!(statistics, Statistics { steps: 216, rejected: 22 + 2, rhs_evaluations: 1442 });
     for (found, (published, exact)) in found.iter().zip(&PUBLISHED) {
         // even the error is the published one, to the rounding that the orbit amplifies (0.3 % of it)
         let error = distance(published, exact);
-        assert!(
-            distance(found, published) < 0.01 * error,
-            "{:e} of {error:e}",
-            distance(found, published)
-        );
+        assert!(distance(found, published) < 0.01 * error, "{:e} of {error:e}", distance(found, published));
     }
 }
 

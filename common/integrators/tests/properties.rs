@@ -8,9 +8,7 @@ use proptest::prelude::*;
 
 fn advance(solver: &mut Solver, ode: &Linear, t: f64, t_end: f64, x: &mut [f64; 2]) -> Statistics {
     let mut statistics = Statistics::default();
-    solver
-        .advance(ode, t, t_end, x, &mut statistics)
-        .expect("linear problem");
+    solver.advance(ode, t, t_end, x, &mut statistics).expect("linear problem");
     statistics
 }
 

@@ -10,11 +10,9 @@ use proptest::prelude::*;
 #[test]
 fn stability_functions_are_the_published_ones() {
     for z in [-3.0, -1.0, -0.1, 0.1, 1.0] {
-        for (method, degree, extra) in [
-            (Method::Heun, 2, 0.0),
-            (Method::Rk4, 4, 0.0),
-            (Method::Dopri5, 5, 1.0 / 600.0),
-        ] {
+        for (method, degree, extra) in
+            [(Method::Heun, 2, 0.0), (Method::Rk4, 4, 0.0), (Method::Dopri5, 5, 1.0 / 600.0)]
+        {
             let (mut term, mut exact) = (1.0, 1.0);
             for k in 1..=degree {
                 term *= z / f64::from(k);
@@ -22,10 +20,7 @@ fn stability_functions_are_the_published_ones() {
             }
             exact += extra * z.powi(6);
             let r = method.stability(Complex::new(z, 0.0));
-            assert!(
-                (r.re - exact).abs() < 1e-14 && r.im.abs() < 1e-15,
-                "{method:?} {z}: {r:?}"
-            ); // sums of terms < 10
+            assert!((r.re - exact).abs() < 1e-14 && r.im.abs() < 1e-15, "{method:?} {z}: {r:?}"); // sums of terms < 10
         }
     }
 }
@@ -36,15 +31,10 @@ fn oscillator_grows_by_the_stability_function() {
     for method in Method::ALL {
         for h in [0.01, 0.3, 1.0, 2.5] {
             let x = [0.6, -0.8];
-            let growth = distance(
-                &in_calls(&mut fixed(method, 5.0), &Linear::OSCILLATOR, [0.0, h], 1, x),
-                &[0.0; 2],
-            );
+            let growth =
+                distance(&in_calls(&mut fixed(method, 5.0), &Linear::OSCILLATOR, [0.0, h], 1, x), &[0.0; 2]);
             let r = method.stability(Complex::new(0.0, h)).abs();
-            assert!(
-                (growth - r).abs() < 1e-14 * r.max(1.0),
-                "{method:?} {h}: {growth} {r}"
-            );
+            assert!((growth - r).abs() < 1e-14 * r.max(1.0), "{method:?} {h}: {growth} {r}");
         }
     }
 }
@@ -53,35 +43,19 @@ fn oscillator_grows_by_the_stability_function() {
 /// out, where `|R| = 1.1` exactly.
 #[test]
 fn largest_step_is_where_growth_reaches_the_bound() {
-    let lambdas = [
-        (-5.0, 0.0),
-        (-1.0, 3.0),
-        (0.0, 40.0),
-        (0.2, 1.0),
-        (-6197.0, 9090.0),
-    ]
-    .map(Complex::from);
+    let lambdas = [(-5.0, 0.0), (-1.0, 3.0), (0.0, 40.0), (0.2, 1.0), (-6197.0, 9090.0)].map(Complex::from);
     for method in Method::ALL {
         for lambda in lambdas {
             let h = largest_stable_step(method, &[lambda]);
             let growth = method.stability(h * lambda).abs();
-            assert!(
-                (growth - MAX_AMPLIFICATION).abs() < 1e-13,
-                "{method:?} {lambda:?}: {growth}"
-            );
+            assert!((growth - MAX_AMPLIFICATION).abs() < 1e-13, "{method:?} {lambda:?}: {growth}");
             assert!(!violates(method, h, lambda) && violates(method, h * (1.0 + 1e-12), lambda));
             for i in 0..1000 {
-                assert!(
-                    !violates(method, h * f64::from(i) / 1000.0, lambda),
-                    "every smaller step is usable"
-                );
+                assert!(!violates(method, h * f64::from(i) / 1000.0, lambda), "every smaller step is usable");
             }
         }
         let all = largest_stable_step(method, &lambdas);
-        assert!(
-            (all - largest_stable_step(method, &lambdas[4..])).abs() < 1e-18,
-            "the fastest mode decides"
-        );
+        assert!((all - largest_stable_step(method, &lambdas[4..])).abs() < 1e-18, "the fastest mode decides");
     }
 }
 

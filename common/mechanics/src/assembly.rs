@@ -233,12 +233,7 @@ where
                 Parent::Element(parent, _) => (r[parent] + hangs_at[i].r, v[parent] + hangs_at[i].v),
             };
         }
-        Kinematics {
-            poses,
-            hangs_at,
-            r,
-            v,
-        }
+        Kinematics { poses, hangs_at, r, v }
     }
 
     /// Inertia of each element about its joint.
@@ -270,9 +265,7 @@ where
             hinged[i] = if held == Some(i) {
                 loaded[i].hold()
             } else {
-                loaded[i]
-                    .hinge()
-                    .map_err(|source| AssemblyError::Inertia { element: i, source })?
+                loaded[i].hinge().map_err(|source| AssemblyError::Inertia { element: i, source })?
             };
             if let Parent::Element(parent, _) = self.members[i].parent {
                 let Hinged { f, M, .. } = hinged[i];
@@ -288,23 +281,14 @@ where
         let ClosingJoint { first, second } = &self.closures[c];
         let (p_1, p_2) = (k.point(first), k.point(second));
         let ((r_1, v_1), (r_2, v_2)) = (k.motion(first.element, &p_1), k.motion(second.element, &p_2));
-        Gap {
-            r: r_1 - r_2,
-            v: v_1 - v_2,
-            first: p_1,
-            second: p_2,
-        }
+        Gap { r: r_1 - r_2, v: v_1 - v_2, first: p_1, second: p_2 }
     }
 
     /// Relative motion at all closing joints; zero for those not in use.
     #[inline]
     pub fn gaps<S: Scalar>(&self, k: &KinematicsOf<S, J, D, N, B>) -> [Gap<S, D, N>; C] {
-        let none = Gap {
-            r: Vector::zeros(),
-            v: Vector::zeros(),
-            first: Point::zero(),
-            second: Point::zero(),
-        };
+        let none =
+            Gap { r: Vector::zeros(), v: Vector::zeros(), first: Point::zero(), second: Point::zero() };
         std::array::from_fn(|c| if c < self.closed { self.gap(k, c) } else { none })
     }
 
@@ -364,11 +348,11 @@ where
         let unit = Matrix::<S, D, D>::identity();
         for i in 0..self.closed {
             self.pair_inwards(k, tree, i, &gaps[i], unit, |element, answer| {
-                dq[element] += answer.q
+                dq[element] += answer.q;
             });
-            for j in i..(i + W).min(self.closed) {
+            for (j, gap) in gaps.iter().enumerate().take((i + W).min(self.closed)).skip(i) {
                 let mut block = Matrix::<S, D, D>::zeros();
-                self.pair_inwards(k, tree, j, &gaps[j], unit, |element, answer| {
+                self.pair_inwards(k, tree, j, gap, unit, |element, answer| {
                     block += dq[element].transpose() * answer.generalised;
                 });
                 band.set(i, j, block);
@@ -471,13 +455,7 @@ where
             (q, a) = self.outwards(k, &tree, &root, true);
         }
         let F = std::array::from_fn(|i| tree.hinged[i].root_force(&a[i]));
-        Ok(Accelerations {
-            q,
-            a,
-            F,
-            lambda,
-            deficient,
-        })
+        Ok(Accelerations { q, a, F, lambda, deficient })
     }
 
     /// Time derivative of all states.

@@ -92,11 +92,9 @@ where
 {
     /// A zero matrix of `used` block rows.
     #[inline]
+    #[must_use]
     pub fn new(used: usize) -> Self {
-        Self {
-            rows: [[Matrix::<S, D, D>::zeros(); W]; C],
-            used,
-        }
+        Self { rows: [[Matrix::<S, D, D>::zeros(); W]; C], used }
     }
 
     /// Set the block of rows `i`, columns `j >= i`.
@@ -197,20 +195,12 @@ where
     fn solve_with_deficient_rank(&self, x: &mut [Vector<S, D>; C]) -> Result<(), InconsistentClosure> {
         let n = D * self.used;
         let kept = |i: usize, j: usize| {
-            if j < self.end(i) {
-                self.at(i, j)
-            } else {
-                S::lift(0.0)
-            }
+            if j < self.end(i) { self.at(i, j) } else { S::lift(0.0) }
         };
         let K = DMatrix::from_fn(n, n, |i, j| kept(i.min(j), i.max(j)));
         let rhs = DVector::from_fn(n, |i, _| x[i / D][i % D]);
         let eigen = K.map(S::re).symmetric_eigen();
-        let P = pseudo_inverse(
-            eigen.eigenvalues.iter().copied(),
-            &eigen.eigenvectors,
-            &rhs.map(S::re),
-        )?;
+        let P = pseudo_inverse(eigen.eigenvalues.iter().copied(), &eigen.eigenvectors, &rhs.map(S::re))?;
         let P = P.map(S::lift);
         let F = &P * &rhs;
         let F = &F + &P * (&rhs - &K * &F);
@@ -243,11 +233,7 @@ fn pseudo_inverse(
 /// Refuse a right side of size `norm` with the part `gap` in a dropped direction.
 fn consistent(gap: f64, norm: f64) -> Result<(), InconsistentClosure> {
     let allowed = CONSISTENCY_TOLERANCE * norm;
-    if gap > allowed {
-        Err(InconsistentClosure { gap, allowed })
-    } else {
-        Ok(())
-    }
+    if gap > allowed { Err(InconsistentClosure { gap, allowed }) } else { Ok(()) }
 }
 
 /// How well a closure is determined.
@@ -267,18 +253,12 @@ where
     let (lambda, V) = Dim::<D>::symmetric_eigen(&Y.map(S::re));
     let largest = lambda.imax();
     let kept = |i: &usize| lambda[*i] > RANK_TOLERANCE * lambda[largest];
-    let smallest = (0..D)
-        .filter(kept)
-        .min_by(|a, b| lambda[*a].total_cmp(&lambda[*b]))
-        .unwrap_or(largest);
+    let smallest = (0..D).filter(kept).min_by(|a, b| lambda[*a].total_cmp(&lambda[*b])).unwrap_or(largest);
     let along = |i: usize| {
         let v = V.column(i).map(S::lift);
         v.dot(&(Y * v))
     };
-    Conditioning {
-        rank: (0..D).filter(kept).count(),
-        condition: along(largest) / along(smallest),
-    }
+    Conditioning { rank: (0..D).filter(kept).count(), condition: along(largest) / along(smallest) }
 }
 
 #[cfg(test)]
@@ -320,15 +300,8 @@ mod tests {
         let by_eigenvalues = close_with_deficient_rank(&Y, &rhs).expect("regular");
         let det = Y[(0, 0)] * Y[(1, 1)] - Y[(0, 1)] * Y[(1, 0)];
         let r = rhs;
-        let exact = Vector2::new(
-            Y[(1, 1)] * r.x - Y[(0, 1)] * r.y,
-            Y[(0, 0)] * r.y - Y[(1, 0)] * r.x,
-        );
-        for (a, b) in x
-            .iter()
-            .chain(by_eigenvalues.iter())
-            .zip(exact.iter().chain(exact.iter()))
-        {
+        let exact = Vector2::new(Y[(1, 1)] * r.x - Y[(0, 1)] * r.y, Y[(0, 0)] * r.y - Y[(1, 0)] * r.x);
+        for (a, b) in x.iter().chain(by_eigenvalues.iter()).zip(exact.iter().chain(exact.iter())) {
             let b = *b / det;
             assert!((a.re - b.re).abs() < 1e-14 && (a.eps - b.eps).abs() < 1e-14);
         }
@@ -348,16 +321,10 @@ mod tests {
                 let upper = Matrix2::new(1.0, 0.3, -0.2, 0.7);
                 band.set(i, i + 1, upper);
                 dense.view_mut((2 * i, 2 * i + 2), (2, 2)).copy_from(&upper);
-                dense
-                    .view_mut((2 * i + 2, 2 * i), (2, 2))
-                    .copy_from(&upper.transpose());
+                dense.view_mut((2 * i + 2, 2 * i), (2, 2)).copy_from(&upper.transpose());
             }
         }
-        let rhs = [
-            Vector2::new(1.0, 2.0),
-            Vector2::new(-3.0, 0.5),
-            Vector2::new(0.1, 4.0),
-        ];
+        let rhs = [Vector2::new(1.0, 2.0), Vector2::new(-3.0, 0.5), Vector2::new(0.1, 4.0)];
         let mut x = rhs;
         assert!(!band.solve(&mut x).expect("regular"));
         let flat =

@@ -72,19 +72,16 @@ where
         self.each_mut(x, |i, own| {
             let joint = &self.members[i].joint;
             if rates {
-                joint.push(own, &change[i])
+                joint.push(own, &change[i]);
             } else {
-                joint.shift(own, &change[i])
+                joint.shift(own, &change[i]);
             }
         });
         Ok(())
     }
 
     fn largest(&self, gaps: &[Gap<f64, D, N>; C], part: impl Fn(&Gap<f64, D, N>) -> Vector<f64, D>) -> f64 {
-        gaps.iter()
-            .take(self.closed)
-            .map(|gap| part(gap).norm())
-            .fold(0.0, f64::max)
+        gaps.iter().take(self.closed).map(|gap| part(gap).norm()).fold(0.0, f64::max)
     }
 
     /// Bring the states back on the loops, and every orientation on its manifold; true if they
@@ -133,7 +130,7 @@ where
     pub fn off_manifold(&self, x: &[f64]) -> f64 {
         let mut off = 0.0;
         self.each(x, |i, own| {
-            off = f64::max(off, self.members[i].joint.off_manifold(own))
+            off = f64::max(off, self.members[i].joint.off_manifold(own));
         });
         off
     }
@@ -158,7 +155,7 @@ where
             }
             self.correct(x, &mobility, |c| mobility.gaps[c].r, false)?;
         }
-        if !(gap <= ACCEPTED) {
+        if gap.is_nan() || gap > ACCEPTED {
             return Err(NotClosed::Gap { gap });
         }
         let mobility = self.unloaded(self.kinematics(x, at_rest), Some(held))?;

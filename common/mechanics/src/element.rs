@@ -40,12 +40,7 @@ impl<S: Scalar, const D: usize, const N: usize> Point<S, D, N> {
     /// The joint itself.
     #[must_use]
     pub fn zero() -> Self {
-        Self {
-            r: Vector::zeros(),
-            v: Vector::zeros(),
-            J: Matrix::zeros(),
-            c: Vector::zeros(),
-        }
+        Self { r: Vector::zeros(), v: Vector::zeros(), J: Matrix::zeros(), c: Vector::zeros() }
     }
 }
 
@@ -150,13 +145,7 @@ impl<S: Scalar, const D: usize, const N: usize> Loaded<S, D, N> {
         let Kq = inverse * K;
         let q0 = inverse * Q0; // (6) at a_A = 0
         let Kt = K.transpose();
-        Hinged {
-            M: M - Kt * Kq,
-            f: f - Kt * q0,
-            q0,
-            Kq,
-            inverse,
-        }
+        Hinged { M: M - Kt * Kq, f: f - Kt * q0, q0, Kq, inverse }
     }
 }
 
@@ -191,11 +180,7 @@ impl<S: Scalar, const D: usize, const N: usize> Hinged<S, D, N> {
     #[inline]
     pub fn answer<const R: usize>(&self, p: &Point<S, D, N>, F: &Matrix<S, D, R>) -> Answer<S, D, N, R> {
         let generalised = p.J.transpose() * F;
-        Answer {
-            q: self.inverse * generalised,
-            f: F - self.Kq.transpose() * generalised,
-            generalised,
-        }
+        Answer { q: self.inverse * generalised, f: F - self.Kq.transpose() * generalised, generalised }
     }
 
     /// No element at all, to be overwritten.

@@ -43,8 +43,8 @@ pub trait Pose<S, const D: usize, const N: usize> {
     fn drive(&self, torque: &Vector3<S>) -> Vector<S, N>;
     /// Angular velocity, world frame [rad/s].
     fn omega(&self) -> Vector3<S>;
-    /// Angular acceleration for q'', world frame (3) [rad/s2].
-    fn alpha(&self, q_ddot: &Vector<S, N>) -> Vector3<S>;
+    /// Rate of the moment of momentum about the joint, J_A alpha + omega x J_A omega [N.m].
+    fn momentum_rate(&self, rigid: &Rigid<D>, q_ddot: &Vector<S, N>) -> Vector3<S>;
 }
 
 /// A joint kind with `N` degrees of freedom in the space of dimension `D`.
@@ -96,12 +96,7 @@ impl<S: Scalar> Pose<S, 2, 1> for PlanarPose<S> {
         let Self { sin, cos, theta_dot } = *self;
         let r = Vector2::new(cos * p.x - sin * p.y, sin * p.x + cos * p.y);
         let n = Vector2::new(-r.y, r.x);
-        Point {
-            r,
-            v: n * theta_dot,
-            J: n,
-            c: -r * (theta_dot * theta_dot),
-        }
+        Point { r, v: n * theta_dot, J: n, c: -r * (theta_dot * theta_dot) }
     }
     #[inline]
     fn body(&self, rigid: &Rigid<2>) -> Body<S, 2, 1> {
@@ -126,8 +121,9 @@ impl<S: Scalar> Pose<S, 2, 1> for PlanarPose<S> {
         Vector3::new(S::lift(0.0), -self.theta_dot, S::lift(0.0))
     }
     #[inline]
-    fn alpha(&self, q_ddot: &Vector<S, 1>) -> Vector3<S> {
-        Vector3::new(S::lift(0.0), -q_ddot[0], S::lift(0.0))
+    fn momentum_rate(&self, rigid: &Rigid<2>, q_ddot: &Vector<S, 1>) -> Vector3<S> {
+        let J_y = rigid.I_c[(1, 1)] + rigid.m * rigid.c.norm_squared();
+        Vector3::new(S::lift(0.0), -q_ddot[0] * J_y, S::lift(0.0))
     }
 }
 
@@ -144,11 +140,7 @@ impl Joint<2, 1> for Planar {
     #[inline]
     fn pose<S: Scalar>(&self, x: &[S]) -> PlanarPose<S> {
         let (sin, cos) = x[0].sin_cos();
-        PlanarPose {
-            sin,
-            cos,
-            theta_dot: x[1],
-        }
+        PlanarPose { sin, cos, theta_dot: x[1] }
     }
     #[inline]
     fn derivative<S: Scalar>(&self, x: &[S], q_ddot: &Vector<S, 1>, x_dot: &mut [S]) {

@@ -14,10 +14,7 @@
 //! numbers are those of the models' documentation ([`element`]).
 
 #![forbid(unsafe_code)]
-#![allow(
-    non_snake_case,
-    reason = "fields and locals carry the paper's symbols: F, M, G, Y, R"
-)]
+#![allow(non_snake_case, reason = "fields and locals carry the paper's symbols: F, M, G, Y, R")]
 
 pub mod assembly;
 pub mod closure;

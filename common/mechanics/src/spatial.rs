@@ -49,44 +49,22 @@ impl<S: Scalar> SpatialPose<S> {
 impl<S: Scalar> Pose<S, 3, 3> for SpatialPose<S> {
     #[inline]
     fn point(&self, p: &Vector<f64, 3>) -> Point<S, 3, 3> {
-        let Self {
-            R, H, gamma, omega, ..
-        } = self;
+        let Self { R, H, gamma, omega, .. } = self;
         let r = R * lift(p);
-        let J = Matrix3::from_columns(&[
-            H.column(0).cross(&r),
-            H.column(1).cross(&r),
-            H.column(2).cross(&r),
-        ]);
+        let J = Matrix3::from_columns(&[H.column(0).cross(&r), H.column(1).cross(&r), H.column(2).cross(&r)]);
         let v = omega.cross(&r);
-        Point {
-            r,
-            v,
-            J,
-            c: gamma.cross(&r) + omega.cross(&v),
-        }
+        Point { r, v, J, c: gamma.cross(&r) + omega.cross(&v) }
     }
     #[inline]
     fn body(&self, rigid: &Rigid<3>) -> Body<S, 3, 3> {
-        let Self {
-            H,
-            gamma,
-            omega,
-            axes,
-            ..
-        } = self;
+        let Self { H, gamma, omega, axes, .. } = self;
         let J_A = self.inertia(rigid);
         let torque = omega.cross(&(J_A * omega)) + J_A * gamma; // (5)
         let mut Mq = H.transpose() * J_A * H;
         for i in *axes..3 {
             Mq[(i, i)] = S::lift(1.0);
         }
-        Body {
-            m: S::lift(rigid.m),
-            com: self.point(&rigid.c),
-            Mq,
-            Q: -(H.transpose() * torque),
-        }
+        Body { m: S::lift(rigid.m), com: self.point(&rigid.c), Mq, Q: -(H.transpose() * torque) }
     }
     #[inline]
     fn spin_energy(&self, rigid: &Rigid<3>) -> S {
@@ -102,8 +80,10 @@ impl<S: Scalar> Pose<S, 3, 3> for SpatialPose<S> {
         self.omega
     }
     #[inline]
-    fn alpha(&self, q_ddot: &Vector3<S>) -> Vector3<S> {
-        self.H * q_ddot + self.gamma
+    fn momentum_rate(&self, rigid: &Rigid<3>, q_ddot: &Vector3<S>) -> Vector3<S> {
+        let J_A = self.inertia(rigid);
+        let alpha = self.H * q_ddot + self.gamma; // (3)
+        J_A * alpha + self.omega.cross(&(J_A * self.omega))
     }
 }
 
@@ -122,12 +102,7 @@ fn link_frame<S: Scalar>(phi: S, theta: S) -> (Matrix3<S>, Vector3<S>, Vector3<S
 fn quaternion_rate<S: Scalar>(p: &[S], omega: &[S]) -> [S; 4] {
     let (w, x, y, z) = (p[0], p[1], p[2], p[3]);
     let (a, b, c) = (omega[0] * 0.5, omega[1] * 0.5, omega[2] * 0.5);
-    [
-        -a * x - b * y - c * z,
-        a * w + b * z - c * y,
-        b * w + c * x - a * z,
-        c * w + a * y - b * x,
-    ]
+    [-a * x - b * y - c * z, a * w + b * z - c * y, b * w + c * x - a * z, c * w + a * y - b * x]
 }
 
 /// Rotation of a quaternion of any length.
@@ -193,13 +168,7 @@ impl Joint<3, 3> for Spatial {
             Self::Revolute { phi } => {
                 let (R, axis, _) = link_frame(S::lift(*phi), x[0]);
                 let H = Matrix3::from_columns(&[axis, o, o]);
-                SpatialPose {
-                    R,
-                    H,
-                    axes: 1,
-                    gamma: o,
-                    omega: axis * x[1],
-                }
+                SpatialPose { R, H, axes: 1, gamma: o, omega: axis * x[1] }
             }
             Self::Universal => {
                 let (phi_dot, theta_dot) = (x[2], x[3]);
@@ -405,9 +374,7 @@ mod tests {
     /// theta > 0 lifts the tip: the sign convention of (1) in one place.
     #[test]
     fn positive_theta_lifts_the_tip() {
-        let tip = Spatial::Universal
-            .pose(&[0.0, 0.1, 0.0, 0.0])
-            .point(&Vector3::new(1.0, 0.0, 0.0));
+        let tip = Spatial::Universal.pose(&[0.0, 0.1, 0.0, 0.0]).point(&Vector3::new(1.0, 0.0, 0.0));
         assert!(tip.r.z > 0.0 && tip.r.x > 0.0);
         let tip: Point<f64, 2, 1> = Planar.pose(&[0.1, 0.0]).point(&Vector2::new(1.0, 0.0));
         assert!(tip.r.y > 0.0);

@@ -82,12 +82,7 @@ mod tests {
     /// A stretched spring pulls the body towards T: the sign convention of (16) in one place.
     #[test]
     fn tension_pulls_towards_the_other_end() {
-        let spring = SpringDamper {
-            k: 100.0,
-            c: Some(2.0),
-            l0: 1.0,
-            F_pre: 0.0,
-        };
+        let spring = SpringDamper { k: 100.0, c: Some(2.0), l0: 1.0, F_pre: 0.0 };
         let at_rest = spring.state(&Vector3::new(0.0, 0.0, 1.5), &Vector3::zeros());
         let s = at_rest.expect("the spring has a length");
         assert!((s.F_s - 50.0).abs() < 1e-13);
@@ -97,12 +92,7 @@ mod tests {
     /// A preload pushes apart: at the free length the tension is -F_pre.
     #[test]
     fn preload_pushes_apart() {
-        let spring = SpringDamper {
-            k: 100.0,
-            c: None,
-            l0: 1.0,
-            F_pre: 7.0,
-        };
+        let spring = SpringDamper { k: 100.0, c: None, l0: 1.0, F_pre: 7.0 };
         let s = spring.state(&Vector3::new(1.0, 0.0, 0.0), &Vector3::zeros());
         assert!((s.expect("length 1").F_s + 7.0).abs() < 1e-13);
     }
@@ -110,33 +100,17 @@ mod tests {
     /// The force is the slope of the energy: central difference at 1e-6 m, error about 1e-9 k.
     #[test]
     fn force_is_the_slope_of_the_energy() {
-        let spring = SpringDamper {
-            k: 2.0e4,
-            c: None,
-            l0: 0.36,
-            F_pre: 500.0,
-        };
+        let spring = SpringDamper { k: 2.0e4, c: None, l0: 0.36, F_pre: 500.0 };
         let (l, d) = (0.31, 1e-6);
         let slope = (spring.energy(l + d) - spring.energy(l - d)) / (2.0 * d);
-        let s = spring
-            .state(&Vector3::new(l, 0.0, 0.0), &Vector3::zeros())
-            .expect("length");
+        let s = spring.state(&Vector3::new(l, 0.0, 0.0), &Vector3::zeros()).expect("length");
         assert!((slope - s.F_s).abs() < 1e-5);
     }
 
     /// The direction is lost at zero length; no number is made up.
     #[test]
     fn vanishing_length_has_no_state() {
-        let spring = SpringDamper {
-            k: 1.0,
-            c: None,
-            l0: 1.0,
-            F_pre: 0.0,
-        };
-        assert!(
-            spring
-                .state(&Vector3::new(1e-10, 0.0, 0.0), &Vector3::zeros())
-                .is_none()
-        );
+        let spring = SpringDamper { k: 1.0, c: None, l0: 1.0, F_pre: 0.0 };
+        assert!(spring.state(&Vector3::new(1e-10, 0.0, 0.0), &Vector3::zeros()).is_none());
     }
 }

@@ -29,18 +29,14 @@ use syn::{
 #[proc_macro_derive(Variables, attributes(variables, var))]
 pub fn variables(input: TokenStream) -> TokenStream {
     let input = parse_macro_input!(input as DeriveInput);
-    expand_variables(&input)
-        .unwrap_or_else(|e| e.to_compile_error())
-        .into()
+    expand_variables(&input).unwrap_or_else(|e| e.to_compile_error()).into()
 }
 
 /// Implement `model::Variables<f64>` for a field-less enum whose items count from 1; item names are the variants in `snake_case`.
 #[proc_macro_derive(Enumeration)]
 pub fn enumeration(input: TokenStream) -> TokenStream {
     let input = parse_macro_input!(input as DeriveInput);
-    expand_enumeration(&input)
-        .unwrap_or_else(|e| e.to_compile_error())
-        .into()
+    expand_enumeration(&input).unwrap_or_else(|e| e.to_compile_error()).into()
 }
 
 /// First paragraph of the documentation, with the unit taken off its end.
@@ -88,9 +84,7 @@ struct FieldAttributes {
 /// A start value as f64: Booleans become 0 and 1.
 fn number(e: &Expr) -> Tokens {
     match e {
-        Expr::Lit(ExprLit {
-            lit: Lit::Bool(b), ..
-        }) => {
+        Expr::Lit(ExprLit { lit: Lit::Bool(b), .. }) => {
             let v = f64::from(u8::from(b.value));
             quote!(#v)
         }
@@ -157,10 +151,9 @@ fn concrete(tokens: Tokens, scalar: Option<&syn::Ident>) -> Tokens {
         .into_iter()
         .map(|tree| match (tree, scalar) {
             (TokenTree::Ident(i), Some(s)) if i == *s => TokenTree::Ident(format_ident!("f64")),
-            (TokenTree::Group(g), _) => TokenTree::Group(proc_macro2::Group::new(
-                g.delimiter(),
-                concrete(g.stream(), scalar),
-            )),
+            (TokenTree::Group(g), _) => {
+                TokenTree::Group(proc_macro2::Group::new(g.delimiter(), concrete(g.stream(), scalar)))
+            }
             (tree, _) => tree,
         })
         .collect()
@@ -202,30 +195,19 @@ fn field_tokens(
     number_type: &Tokens,
     causality: &str,
 ) -> syn::Result<FieldTokens> {
-    let ident = field
-        .ident
-        .as_ref()
-        .ok_or_else(|| syn::Error::new(field.span(), "name"))?;
+    let ident = field.ident.as_ref().ok_or_else(|| syn::Error::new(field.span(), "name"))?;
     let a = field_attributes(field)?;
     let ty = &field.ty;
     let at_f64 = concrete(quote!(#ty), scalar);
     let table = quote!(<#at_f64 as ::model::Variables<f64>>::TABLE);
     let (description, unit) = documentation(&field.attrs);
     let unit = a.unit.or(unit).unwrap_or_default();
-    let unit = if unit == "1" || unit == "-" {
-        String::new()
-    } else {
-        unit
-    };
+    let unit = if unit == "1" || unit == "-" { String::new() } else { unit };
     let (prefix, start, depends, tunable, discrete) =
         (&a.prefix, &a.start, &a.depends, a.tunable, a.discrete);
     let field_causality = format_ident!("{}", if a.local { "Local" } else { causality });
     let initial = format_ident!("{}", a.initial.unwrap_or("Calculated"));
-    let (min, max, nominal) = (
-        option(a.min.as_ref()),
-        option(a.max.as_ref()),
-        option(a.nominal.as_ref()),
-    );
+    let (min, max, nominal) = (option(a.min.as_ref()), option(a.max.as_ref()), option(a.nominal.as_ref()));
     Ok(FieldTokens {
         length: quote!(#table.len()),
         fill: quote! {
@@ -349,9 +331,7 @@ fn expand_enumeration(input: &DeriveInput) -> syn::Result<Tokens> {
         });
     }
     let variants: Vec<_> = data.variants.iter().map(|v| &v.ident).collect();
-    let first = variants
-        .first()
-        .ok_or_else(|| syn::Error::new(name.span(), "no items"))?;
+    let first = variants.first().ok_or_else(|| syn::Error::new(name.span(), "no items"))?;
     Ok(quote! {
         impl ::model::Variables<f64> for #name {
             const TABLE: &'static [::model::Entry] = &[{

@@ -67,9 +67,7 @@ where
         // shifted by its norm: deflation is relative to the diagonal, which a chain of zero
         // eigenvalues does not have
         let shifted = m + Matrix::<f64, N, N>::from_diagonal_element(norm);
-        let lambda = shifted
-            .try_schur(f64::EPSILON, MAX_ITERATIONS)?
-            .complex_eigenvalues();
+        let lambda = shifted.try_schur(f64::EPSILON, MAX_ITERATIONS)?.complex_eigenvalues();
         Some(std::array::from_fn(|i| (lambda[i].re - norm, lambda[i].im)))
     }
 }

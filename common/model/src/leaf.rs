@@ -28,34 +28,18 @@ impl<S: Scalar> SymmetricTensor<S> {
     /// A tensor with the given diagonal.
     pub fn diagonal(xx: S, yy: S, zz: S) -> Self {
         let o = S::lift(0.0);
-        Self {
-            xx,
-            xy: o,
-            xz: o,
-            yy,
-            yz: o,
-            zz,
-        }
+        Self { xx, xy: o, xz: o, yy, yz: o, zz }
     }
 
     /// As a matrix.
     pub fn matrix(&self) -> nalgebra::Matrix3<S> {
-        let Self {
-            xx,
-            xy,
-            xz,
-            yy,
-            yz,
-            zz,
-        } = *self;
+        let Self { xx, xy, xz, yy, yz, zz } = *self;
         nalgebra::Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
     }
 
     /// True if every component is exactly zero.
     pub fn vanishes(&self) -> bool {
-        [self.xx, self.xy, self.xz, self.yy, self.yz, self.zz]
-            .iter()
-            .all(|c| c.vanishes())
+        [self.xx, self.xy, self.xz, self.yy, self.yz, self.zz].iter().all(|c| c.vanishes())
     }
 }
 
@@ -110,14 +94,7 @@ impl<S: Scalar> Variables<S> for SymmetricTensor<S> {
     ];
     #[inline]
     fn load(v: &[S]) -> Self {
-        Self {
-            xx: v[0],
-            xy: v[1],
-            xz: v[2],
-            yy: v[3],
-            yz: v[4],
-            zz: v[5],
-        }
+        Self { xx: v[0], xy: v[1], xz: v[2], yy: v[3], yz: v[4], zz: v[5] }
     }
     #[inline]
     fn store(&self, v: &mut [S]) {
@@ -155,10 +132,7 @@ impl Variables<f64> for bool {
 
 impl Variables<f64> for i32 {
     const TABLE: &'static [Entry] = &[Entry::scalar("", Kind::Int32)];
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "the export layer stores i32 values only"
-    )]
+    #[allow(clippy::cast_possible_truncation, reason = "the export layer stores i32 values only")]
     fn load(values: &[f64]) -> Self {
         values[0] as i32
     }

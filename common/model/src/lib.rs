@@ -89,28 +89,16 @@ mod tests {
 
     #[test]
     fn the_table_has_names_units_and_bounds() {
-        let names: Vec<_> = <Out<f64> as Variables<f64>>::TABLE
-            .iter()
-            .map(Entry::name)
-            .collect();
+        let names: Vec<_> = <Out<f64> as Variables<f64>>::TABLE.iter().map(Entry::name).collect();
         assert_eq!(names, ["P.r.x", "P.r.y", "P.r.z", "angle.theta", "loop.rank"]);
         let table = <Out<f64> as Variables<f64>>::TABLE;
         assert_eq!((table[0].unit, table[0].description), ("m", "Position"));
         assert_eq!(table[0].causality, Causality::Output);
         assert_eq!(table[4].causality, Causality::Local);
-        assert_eq!(
-            (table[3].initial, table[3].start, table[3].nominal),
-            (Initial::Approx, 0.5, 0.1)
-        );
+        assert_eq!((table[3].initial, table[3].start, table[3].nominal), (Initial::Approx, 0.5, 0.1));
         let mass = <Param as Variables<f64>>::TABLE[0];
-        assert_eq!(
-            (mass.min, mass.unit, mass.description),
-            (f64::MIN_POSITIVE, "kg", "Mass of the body")
-        );
-        assert_eq!(
-            <Param as Variables<f64>>::TABLE[3].variability,
-            Variability::Tunable
-        );
+        assert_eq!((mass.min, mass.unit, mass.description), (f64::MIN_POSITIVE, "kg", "Mass of the body"));
+        assert_eq!(<Param as Variables<f64>>::TABLE[3].variability, Variability::Tunable);
         let Kind::Enumeration(kinds) = <Param as Variables<f64>>::TABLE[1].kind else {
             panic!("enumeration")
         };
@@ -120,16 +108,10 @@ mod tests {
     #[test]
     fn values_survive_store_and_load() {
         let p = Param::default();
-        assert_eq!(
-            (p.m, p.kind, p.A, p.it),
-            (4.0, Kinds::Second, Vector3::new(1.0, 2.0, 3.0), true)
-        );
+        assert_eq!((p.m, p.kind, p.A, p.it), (4.0, Kinds::Second, Vector3::new(1.0, 2.0, 3.0), true));
         let mut values = [0.0; 6];
         p.store(&mut values);
         assert_eq!(Param::load(&values), p);
-        assert_eq!(
-            values.map(f64::to_bits),
-            [4.0, 2.0, 1.0, 2.0, 3.0, 1.0].map(f64::to_bits)
-        );
+        assert_eq!(values.map(f64::to_bits), [4.0, 2.0, 1.0, 2.0, 3.0, 1.0].map(f64::to_bits));
     }
 }

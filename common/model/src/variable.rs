@@ -100,7 +100,8 @@ pub struct Entry {
     pub max: f64,
     /// Typical magnitude
     pub nominal: f64,
-    /// Inputs (or groups of inputs, by prefix) that the value depends on directly
+    /// Inputs that the value depends on directly: names, groups by prefix (`P.F`), or the same
+    /// component of a group (`A.r.@`)
     pub depends: &'static [&'static str],
 }
 

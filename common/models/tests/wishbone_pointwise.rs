@@ -16,30 +16,16 @@ struct Reference {
 
 impl Reference {
     fn read(name: &str) -> Self {
-        let path = format!(
-            "{}/../../tests/reference/suspension/{name}.csv",
-            env!("CARGO_MANIFEST_DIR")
-        );
+        let path = format!("{}/../../tests/reference/suspension/{name}.csv", env!("CARGO_MANIFEST_DIR"));
         let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path}: {e}"));
         let mut lines = text.lines().filter(|l| !l.starts_with('#'));
-        let columns = lines
-            .next()
-            .expect("header")
-            .split(',')
-            .map(String::from)
-            .collect();
-        let rows = lines
-            .map(|l| l.split(',').map(|v| v.parse().expect("number")).collect())
-            .collect();
+        let columns = lines.next().expect("header").split(',').map(String::from).collect();
+        let rows = lines.map(|l| l.split(',').map(|v| v.parse().expect("number")).collect()).collect();
         Self { columns, rows }
     }
 
     fn row(&self, i: usize) -> HashMap<&str, f64> {
-        self.columns
-            .iter()
-            .map(String::as_str)
-            .zip(self.rows[i].iter().copied())
-            .collect()
+        self.columns.iter().map(String::as_str).zip(self.rows[i].iter().copied()).collect()
     }
 }
 
@@ -91,20 +77,11 @@ fn differences(row: &HashMap<&str, f64>, (m, d, e, _): &Values) -> (f64, f64, f6
             })
             .fold(0.0, f64::max)
     };
-    let points = worst(&[
-        ("B.r", m.B_r.into()),
-        ("C.r", m.C_r.into()),
-        ("P.r", m.P_r.into()),
-    ]);
-    let forces = worst(&[
-        ("A.F", d.A_F.into()),
-        ("B.F", d.B_F.into()),
-        ("C.F", d.C_F.into()),
-        ("D.F", d.D_F.into()),
-    ]);
-    let energies = (e.kinetic - row["energy.kinetic"])
-        .abs()
-        .max((e.potential - row["energy.potential"]).abs());
+    let points = worst(&[("B.r", m.B_r.into()), ("C.r", m.C_r.into()), ("P.r", m.P_r.into())]);
+    let forces =
+        worst(&[("A.F", d.A_F.into()), ("B.F", d.B_F.into()), ("C.F", d.C_F.into()), ("D.F", d.D_F.into())]);
+    let energies =
+        (e.kinetic - row["energy.kinetic"]).abs().max((e.potential - row["energy.potential"]).abs());
     (points, forces, energies)
 }
 
@@ -119,11 +96,8 @@ fn paper_case_agrees_at_every_reference_state() {
     let wishbone = wishbone(&Parameters::default());
     for i in 0..reference.rows.len() {
         let row = reference.row(i);
-        let values = wishbone.with_system(At {
-            t: row["t"],
-            x: &planar_states(&row),
-            pulse: PulsePhase::After,
-        });
+        let values =
+            wishbone.with_system(At { t: row["t"], x: &planar_states(&row), pulse: PulsePhase::After });
         let (points, forces, energies) = differences(&row, &values);
         assert!(points < 1e-14, "points {points:e} at t = {}", row["t"]);
         assert!(forces < 1e-9, "forces {forces:e} at t = {}", row["t"]);
@@ -138,10 +112,7 @@ fn paper_case_agrees_at_every_reference_state() {
 #[test]
 fn road_case_agrees_at_every_reference_state() {
     let reference = Reference::read("wishbone_road");
-    let mut p = Parameters {
-        preload_mode: PreloadMode::Static,
-        ..Parameters::default()
-    };
+    let mut p = Parameters { preload_mode: PreloadMode::Static, ..Parameters::default() };
     p.gravity.z = -9.80665;
     (p.force.pulse_start, p.force.pulse_duration) = (0.5, 0.08);
     p.static_load.z = 3500.0;
@@ -151,16 +122,8 @@ fn road_case_agrees_at_every_reference_state() {
     let wishbone = wishbone(&p);
     for i in 0..reference.rows.len() {
         let row = reference.row(i);
-        let pulse = if row["t"] >= 0.5 && row["t"] < 0.58 {
-            PulsePhase::During
-        } else {
-            PulsePhase::After
-        };
-        let values = wishbone.with_system(At {
-            t: row["t"],
-            x: &planar_states(&row),
-            pulse,
-        });
+        let pulse = if row["t"] >= 0.5 && row["t"] < 0.58 { PulsePhase::During } else { PulsePhase::After };
+        let values = wishbone.with_system(At { t: row["t"], x: &planar_states(&row), pulse });
         let (points, forces, energies) = differences(&row, &values);
         assert!(points < 1e-14, "points {points:e} at t = {}", row["t"]);
         assert!(forces < 2e-8, "forces {forces:e} at t = {}", row["t"]);
@@ -185,25 +148,9 @@ fn spatial_case_agrees_at_every_reference_state() {
     let wishbone = wishbone(&p);
     for i in 0..reference.rows.len() {
         let row = reference.row(i);
-        let x = [
-            "theta1",
-            "theta1_dot",
-            "q1",
-            "q2",
-            "q3",
-            "q4",
-            "w.x",
-            "w.y",
-            "w.z",
-            "theta3",
-            "theta3_dot",
-        ]
-        .map(|c| row[c]);
-        let values = wishbone.with_system(At {
-            t: row["t"],
-            x: &x,
-            pulse: PulsePhase::After,
-        });
+        let x = ["theta1", "theta1_dot", "q1", "q2", "q3", "q4", "w.x", "w.y", "w.z", "theta3", "theta3_dot"]
+            .map(|c| row[c]);
+        let values = wishbone.with_system(At { t: row["t"], x: &x, pulse: PulsePhase::After });
         let (points, forces, energies) = differences(&row, &values);
         assert!(points < 1e-14, "points {points:e} at t = {}", row["t"]);
         assert!(forces < 1e-7, "forces {forces:e} at t = {}", row["t"]);

@@ -13,10 +13,7 @@ pub struct Named<M: Model> {
 
 impl<M: Model> Default for Named<M> {
     fn default() -> Self {
-        Self {
-            instance: Instance::new(),
-            table: Table::new::<M>(),
-        }
+        Self { instance: Instance::new(), table: Table::new::<M>() }
     }
 }
 
@@ -42,8 +39,7 @@ impl<M: Model> Named<M> {
     /// # Errors
     /// As [`Instance::set`].
     pub fn set(&mut self, name: &str, value: f64) -> Result<(), Fault> {
-        self.instance
-            .set(&[self.reference(name)], "test", |_: Kind| true, |_| value)
+        self.instance.set(&[self.reference(name)], "test", |_: Kind| true, |_| value)
     }
 
     /// Read a Float64 variable.

@@ -51,9 +51,7 @@ fn steps_values_and_derivatives_do_not_allocate() {
             let before = COUNT.with(Cell::get);
             for i in 0..10_u32 {
                 let t = fmu.instance.time();
-                fmu.instance
-                    .set(&[force], "Float64", |_| true, |_| f64::from(i))
-                    .expect("input");
+                fmu.instance.set(&[force], "Float64", |_| true, |_| f64::from(i)).expect("input");
                 fmu.instance
                     .set(&[damping], "Float64", |_| true, |_| 1000.0 + f64::from(i))
                     .expect("tunable");

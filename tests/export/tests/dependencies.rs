@@ -11,12 +11,7 @@ const SETTINGS: &[&[(&str, f64)]] = &[
     &[("scene.motion", 2.0), ("use.tie", 1.0)],
     &[("scene.motion", 2.0), ("carrier.joint", 2.0)],
     &[("scene.motion", 2.0), ("arm.joint", 2.0), ("use.tie", 1.0)],
-    &[
-        ("scene.motion", 2.0),
-        ("arm.joint", 2.0),
-        ("carrier.joint", 2.0),
-        ("stabilisation.kind", 2.0),
-    ],
+    &[("scene.motion", 2.0), ("arm.joint", 2.0), ("carrier.joint", 2.0), ("stabilisation.kind", 2.0)],
     &[
         ("scene.motion", 2.0),
         ("arm.joint", 2.0),
@@ -35,10 +30,8 @@ fn somewhere(settings: &[(&str, f64)], random: &mut Random) -> Named<DoubleWishb
     let rigid = !settings.iter().any(|(name, _)| *name == "closure.kind");
     if rigid {
         fmu.set("start.override", 1.0).expect("start");
-        fmu.set("lower.angle.theta", random.between(-0.3, 0.2))
-            .expect("angle");
-        fmu.set("lower.angle_rate.theta", random.between(-2.0, 2.0))
-            .expect("rate");
+        fmu.set("lower.angle.theta", random.between(-0.3, 0.2)).expect("angle");
+        fmu.set("lower.angle_rate.theta", random.between(-2.0, 2.0)).expect("rate");
     }
     fmu.set("gravity.z", -9.81).expect("gravity");
     let inputs: Vec<_> = fmu
@@ -50,11 +43,7 @@ fn somewhere(settings: &[(&str, f64)], random: &mut Random) -> Named<DoubleWishb
         .collect();
     for name in inputs {
         let diagonal = [".xx", ".yy", ".zz"].iter().any(|d| name.ends_with(d));
-        let value = if diagonal {
-            random.between(2.0, 4.0)
-        } else {
-            random.between(-1.0, 1.0)
-        };
+        let value = if diagonal { random.between(2.0, 4.0) } else { random.between(-1.0, 1.0) };
         fmu.set(&name, value).expect("input");
     }
     fmu.initialize().expect("a consistent start");
@@ -81,10 +70,7 @@ fn references(fmu: &Named<DoubleWishbone>, causality: Causality) -> Vec<u32> {
 fn declared_dependencies_are_exact() {
     let mut random = Random(7);
     let fmu = Named::<DoubleWishbone>::default();
-    let (inputs, outputs) = (
-        references(&fmu, Causality::Input),
-        references(&fmu, Causality::Output),
-    );
+    let (inputs, outputs) = (references(&fmu, Causality::Input), references(&fmu, Causality::Output));
     let mut observed = vec![vec![false; inputs.len()]; outputs.len()];
     for settings in SETTINGS {
         for _ in 0..3 {
@@ -126,11 +112,8 @@ fn derivatives_are_the_differences_of_affine_outputs() {
         let outputs = references(&fmu, Causality::Output);
         for input in ["P.F.x", "P.F.z", "P.slot[2].F.y", "chassis.a.z"] {
             let reference = fmu.reference(input);
-            let (mut derivative, mut before, mut after) = (
-                vec![0.0; outputs.len()],
-                vec![0.0; outputs.len()],
-                vec![0.0; outputs.len()],
-            );
+            let (mut derivative, mut before, mut after) =
+                (vec![0.0; outputs.len()], vec![0.0; outputs.len()], vec![0.0; outputs.len()]);
             fmu.instance
                 .directional_derivative(&outputs, &[reference], &[1.0], &mut derivative)
                 .expect("derivative");
@@ -177,10 +160,7 @@ fn derivatives_with_respect_to_inertia_agree_with_differences() {
             for (i, d) in derivative.iter().enumerate() {
                 let quotient = (up[i] - down[i]) / (2.0 * h);
                 let scale = 1.0 + up[i].abs() + d.abs();
-                assert!(
-                    (quotient - d).abs() < 2e-7 * scale,
-                    "{input}: {d} against {quotient}"
-                );
+                assert!((quotient - d).abs() < 2e-7 * scale, "{input}: {d} against {quotient}");
             }
         }
     }

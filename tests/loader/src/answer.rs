@@ -63,12 +63,7 @@ pub(crate) struct Failure {
 impl Failure {
     /// The job itself is at fault, or the answer cannot be given.
     pub(crate) fn job(error: &dyn std::error::Error) -> Self {
-        Self {
-            status: "Error",
-            function: "job".into(),
-            time: None,
-            messages: vec![with_causes(error)],
-        }
+        Self { status: "Error", function: "job".into(), time: None, messages: vec![with_causes(error)] }
     }
 
     /// A call failed; what the FMU said about it comes along.
@@ -83,15 +78,8 @@ impl Failure {
 
     /// The library cannot be used.
     pub(crate) fn load(error: &LoadError) -> Self {
-        let messages = std::iter::once(with_causes(error))
-            .chain(error.messages().iter().cloned())
-            .collect();
-        Self {
-            status: "Error",
-            function: error.function().into(),
-            time: None,
-            messages,
-        }
+        let messages = std::iter::once(with_causes(error)).chain(error.messages().iter().cloned()).collect();
+        Self { status: "Error", function: error.function().into(), time: None, messages }
     }
 
     pub(crate) fn to_json(&self) -> String {
@@ -102,15 +90,12 @@ impl Failure {
 
 /// An error and what lies behind it.
 fn with_causes(error: &dyn std::error::Error) -> String {
-    std::iter::successors(error.source(), |cause| cause.source())
-        .map(ToString::to_string)
-        .fold(error.to_string(), |text, cause| {
-            if text.contains(&cause) {
-                text
-            } else {
-                text + ": " + &cause
-            }
-        })
+    std::iter::successors(error.source(), |cause| cause.source()).map(ToString::to_string).fold(
+        error.to_string(),
+        |text, cause| {
+            if text.contains(&cause) { text } else { text + ": " + &cause }
+        },
+    )
 }
 
 /// An answer as text.

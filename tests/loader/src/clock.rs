@@ -12,10 +12,7 @@ pub(crate) struct Times {
 
 /// CPU time of this thread since it started [s].
 fn thread_cpu() -> f64 {
-    let mut time = libc::timespec {
-        tv_sec: 0,
-        tv_nsec: 0,
-    };
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
     #[allow(unsafe_code, reason = "the standard library has no CPU clock")]
     // SAFETY: the pointer is to a live timespec, the only thing the call writes to.
     let status = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
@@ -39,10 +36,7 @@ pub(crate) fn time<T>(section: impl FnOnce() -> T) -> (Times, T) {
 pub(crate) fn own_cost() -> Times {
     let sections: Vec<Times> = (0..1001).map(|_| time(|| ()).0).collect();
     let middle = |of: fn(&Times) -> f64| Spread::of(sections.iter().map(of)).median;
-    Times {
-        cpu: middle(|t| t.cpu),
-        wall: middle(|t| t.wall),
-    }
+    Times { cpu: middle(|t| t.cpu), wall: middle(|t| t.wall) }
 }
 
 /// Smallest and middle of repeated measurements.
@@ -59,10 +53,7 @@ impl Spread {
         sorted.sort_by(f64::total_cmp);
         let n = sorted.len();
         let at = |i: usize| sorted.get(i).copied().unwrap_or(f64::NAN);
-        Self {
-            min: at(0),
-            median: 0.5 * (at(n.saturating_sub(1) / 2) + at(n / 2)),
-        }
+        Self { min: at(0), median: 0.5 * (at(n.saturating_sub(1) / 2) + at(n / 2)) }
     }
 }
 
@@ -83,13 +74,7 @@ pub(crate) fn repeated<E>(
         sum.wall += (times.wall - own_cost.wall).max(1e-9);
         n += 1;
     }
-    Ok((
-        Times {
-            cpu: sum.cpu / f64::from(n),
-            wall: sum.wall / f64::from(n),
-        },
-        u64::from(n),
-    ))
+    Ok((Times { cpu: sum.cpu / f64::from(n), wall: sum.wall / f64::from(n) }, u64::from(n)))
 }
 
 #[cfg(test)]
@@ -99,16 +84,11 @@ mod tests {
     #[test]
     fn spread_is_minimum_and_median() {
         let close = |a: f64, b: f64| (a - b).abs() < 1e-15;
-        for (values, min, median) in [
-            (vec![3.0, 1.0, 2.0], 1.0, 2.0),
-            (vec![4.0, 1.0, 3.0, 2.0], 1.0, 2.5),
-            (vec![5.0], 5.0, 5.0),
-        ] {
+        for (values, min, median) in
+            [(vec![3.0, 1.0, 2.0], 1.0, 2.0), (vec![4.0, 1.0, 3.0, 2.0], 1.0, 2.5), (vec![5.0], 5.0, 5.0)]
+        {
             let spread = Spread::of(values);
-            assert!(
-                close(spread.min, min) && close(spread.median, median),
-                "{spread:?}"
-            );
+            assert!(close(spread.min, min) && close(spread.median, median), "{spread:?}");
         }
         assert!(Spread::of([]).min.is_nan());
     }
@@ -116,30 +96,15 @@ mod tests {
     /// 0.01 s each, until 0.035 s are reached: four; the clocks' cost is not part of the mean.
     #[test]
     fn short_sections_are_repeated() {
-        let section = || {
-            Ok::<_, std::convert::Infallible>(Times {
-                cpu: 0.009,
-                wall: 0.011,
-            })
-        };
-        let Ok((mean, n)) = repeated(
-            0.035,
-            Times {
-                cpu: 0.001,
-                wall: 0.001,
-            },
-            section,
-        );
+        let section = || Ok::<_, std::convert::Infallible>(Times { cpu: 0.009, wall: 0.011 });
+        let Ok((mean, n)) = repeated(0.035, Times { cpu: 0.001, wall: 0.001 }, section);
         assert_eq!(n, 4);
         assert!((mean.cpu - 0.008).abs() < 1e-15 && (mean.wall - 0.01).abs() < 1e-15);
     }
 
     #[test]
     fn a_failing_section_ends_the_measurement() {
-        assert_eq!(
-            repeated(1.0, Times::default(), || Err::<Times, _>("no")),
-            Err("no")
-        );
+        assert_eq!(repeated(1.0, Times::default(), || Err::<Times, _>("no")), Err("no"));
     }
 
     /// A thread that sleeps uses wall time and no CPU time.

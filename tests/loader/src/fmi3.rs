@@ -1,8 +1,5 @@
 //! The part of FMI 3.0 that a co-simulation run needs, behind a safe interface.
-#![allow(
-    unsafe_code,
-    reason = "calls into a C library; every block states why it is sound"
-)]
+#![allow(unsafe_code, reason = "calls into a C library; every block states why it is sound")]
 
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, NulError, c_char, c_int, c_void};
@@ -78,11 +75,7 @@ fn check(function: &'static str, status: Status, time: Option<f64>) -> Result<()
     if status == OK || status == WARNING {
         Ok(())
     } else {
-        Err(Fault {
-            function,
-            status: name_of(status),
-            time,
-        })
+        Err(Fault { function, status: name_of(status), time })
     }
 }
 
@@ -90,15 +83,9 @@ fn check(function: &'static str, status: Status, time: Option<f64>) -> Result<()
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum LoadError {
     #[error("cannot load {path}: {source}")]
-    Library {
-        path: PathBuf,
-        source: libloading::Error,
-    },
+    Library { path: PathBuf, source: libloading::Error },
     #[error("{symbol} is missing: {source}")]
-    Symbol {
-        symbol: &'static str,
-        source: libloading::Error,
-    },
+    Symbol { symbol: &'static str, source: libloading::Error },
     #[error("text with a zero byte: {0}")]
     ZeroByte(#[from] NulError),
     #[error("no instance was made")]
@@ -108,11 +95,7 @@ pub(crate) enum LoadError {
 impl LoadError {
     /// What the FMU said.
     pub(crate) fn messages(&self) -> &[String] {
-        if let Self::Refused { messages } = self {
-            messages
-        } else {
-            &[]
-        }
+        if let Self::Refused { messages } = self { messages } else { &[] }
     }
 
     /// The function to blame.
@@ -154,12 +137,9 @@ unsafe extern "C" fn log_message(
         return;
     };
     match messages.len() {
-        0..MOST_MESSAGES => messages.push(format!(
-            "{} [{}] {}",
-            name_of(status),
-            text(category),
-            text(message)
-        )),
+        0..MOST_MESSAGES => {
+            messages.push(format!("{} [{}] {}", name_of(status), text(category), text(message)));
+        }
         MOST_MESSAGES => messages.push("further messages are left out".into()),
         _ => {}
     }
@@ -196,19 +176,15 @@ fn symbol<T: Copy>(library: &Library, symbol: &'static str) -> Result<T, LoadErr
     // SAFETY: the symbols of an FMI 3.0 library have the types that the standard gives them, which are the ones above;
     // the pointer is used only while the library is open.
     let found = unsafe { library.get::<T>(symbol) };
-    found
-        .map(|f| *f)
-        .map_err(|source| LoadError::Symbol { symbol, source })
+    found.map(|f| *f).map_err(|source| LoadError::Symbol { symbol, source })
 }
 
 impl Fmi {
     /// Loads the library and makes a co-simulation instance without event mode.
     pub(crate) fn instantiate(path: &Path, token: &str, resources: Option<&str>) -> Result<Self, LoadError> {
         // SAFETY: loading runs the library's initialisers; it is the FMU that the caller wants to run.
-        let library = unsafe { Library::new(path) }.map_err(|source| LoadError::Library {
-            path: path.into(),
-            source,
-        })?;
+        let library = unsafe { Library::new(path) }
+            .map_err(|source| LoadError::Library { path: path.into(), source })?;
         let l = &library;
         let f = Functions {
             free_instance: symbol(l, "fmi3FreeInstance")?,
@@ -248,16 +224,9 @@ impl Fmi {
             )
         };
         if instance.is_null() {
-            return Err(LoadError::Refused {
-                messages: log.messages.take(),
-            });
+            return Err(LoadError::Refused { messages: log.messages.take() });
         }
-        Ok(Self {
-            instance,
-            f,
-            log,
-            _library: library,
-        })
+        Ok(Self { instance, f, log, _library: library })
     }
 
     /// What the FMU has said so far.
@@ -283,11 +252,7 @@ impl Fmi {
 
     fn set_one<T>(&self, name: &'static str, set: Set<T>, vr: u32, value: &T) -> Result<(), Fault> {
         // SAFETY: the instance is live; one reference and one value are passed by pointers to them.
-        check(
-            name,
-            unsafe { set(self.instance, &raw const vr, 1, value, 1) },
-            None,
-        )
+        check(name, unsafe { set(self.instance, &raw const vr, 1, value, 1) }, None)
     }
 
     /// Initialisation mode in and out.
@@ -295,11 +260,7 @@ impl Fmi {
         // SAFETY: the instance is live.
         let status = unsafe { (self.f.enter_initialization)(self.instance, false, 0.0, start, true, stop) };
         check("fmi3EnterInitializationMode", status, Some(start))?;
-        self.simple(
-            "fmi3ExitInitializationMode",
-            self.f.exit_initialization,
-            Some(start),
-        )
+        self.simple("fmi3ExitInitializationMode", self.f.exit_initialization, Some(start))
     }
 
     pub(crate) fn reset(&self) -> Result<(), Fault> {
@@ -337,11 +298,7 @@ impl Fmi {
         if terminate == 0 {
             return Ok(());
         }
-        Err(Fault {
-            function: "fmi3DoStep",
-            status: "terminateSimulation",
-            time: Some(t),
-        })
+        Err(Fault { function: "fmi3DoStep", status: "terminateSimulation", time: Some(t) })
     }
 
     /// Reads as many values as there are references.
@@ -359,15 +316,8 @@ impl Fmi {
     fn get<T>(&self, name: &'static str, get: Get<T>, vrs: &[u32], values: &mut [T]) -> Result<(), Fault> {
         assert_eq!(vrs.len(), values.len(), "scalar variables");
         // SAFETY: the instance is live; both pointers are to arrays of the given lengths.
-        let status = unsafe {
-            get(
-                self.instance,
-                vrs.as_ptr(),
-                vrs.len(),
-                values.as_mut_ptr(),
-                values.len(),
-            )
-        };
+        let status =
+            unsafe { get(self.instance, vrs.as_ptr(), vrs.len(), values.as_mut_ptr(), values.len()) };
         check(name, status, None)
     }
 
@@ -377,13 +327,7 @@ impl Fmi {
         assert_eq!(vrs.len(), values.len(), "scalar variables");
         // SAFETY: the instance is live; both pointers are to arrays of the given lengths.
         let status = unsafe {
-            (self.f.set_float64)(
-                self.instance,
-                vrs.as_ptr(),
-                vrs.len(),
-                values.as_ptr(),
-                values.len(),
-            )
+            (self.f.set_float64)(self.instance, vrs.as_ptr(), vrs.len(), values.as_ptr(), values.len())
         };
         check("fmi3SetFloat64", status, None)
     }

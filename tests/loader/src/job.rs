@@ -106,73 +106,35 @@ pub(crate) enum JobError {
     #[error("the job is not valid JSON for this program: {0}")]
     Json(#[from] serde_json::Error),
     #[error("value {value} of variable {vr} is no {kind:?}")]
-    Value {
-        vr: u32,
-        kind: Kind,
-        value: serde_json::Value,
-    },
+    Value { vr: u32, kind: Kind, value: serde_json::Value },
     #[error("text of variable {vr} contains a zero byte")]
     ZeroByte { vr: u32, source: NulError },
     #[error("{name} is {value}; {allowed}")]
-    Range {
-        name: &'static str,
-        value: f64,
-        allowed: &'static str,
-    },
+    Range { name: &'static str, value: f64, allowed: &'static str },
 }
 
 impl Job {
     pub(crate) fn parse(text: &str) -> Result<Self, JobError> {
         let mut job: Self = serde_json::from_str(text)?;
         let range = |ok: bool, name, value, allowed| {
-            if ok {
-                Ok(())
-            } else {
-                Err(JobError::Range { name, value, allowed })
-            }
+            if ok { Ok(()) } else { Err(JobError::Range { name, value, allowed }) }
         };
         range(job.step > 0.0, "H", job.step, "it must be greater than 0 s")?;
-        range(
-            job.stop > job.start,
-            "stop",
-            job.stop,
-            "it must be greater than start",
-        )?;
-        range(
-            job.min_time >= 0.0,
-            "min_time",
-            job.min_time,
-            "it must not be negative",
-        )?;
+        range(job.stop > job.start, "stop", job.stop, "it must be greater than start")?;
+        range(job.min_time >= 0.0, "min_time", job.min_time, "it must not be negative")?;
         range(job.repeat > 0, "repeat", 0.0, "it must be at least 1")?;
         let steps = (job.stop - job.start) / job.step;
-        range(
-            steps <= 1e8,
-            "H",
-            job.step,
-            "it must not divide the run into more than 1e8 steps",
-        )?;
-        job.set = job
-            .start_values
-            .iter()
-            .map(StartValue::coded)
-            .collect::<Result<_, _>>()?;
+        range(steps <= 1e8, "H", job.step, "it must not divide the run into more than 1e8 steps")?;
+        job.set = job.start_values.iter().map(StartValue::coded).collect::<Result<_, _>>()?;
         Ok(job)
     }
 
     /// Communication points `start + i H`; the last is `stop` itself, after a shorter step where `H` does not divide.
     pub(crate) fn points(&self) -> Vec<f64> {
         let steps = ((self.stop - self.start) / self.step - 1e-9).ceil().max(1.0);
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "checked: at most 1e8"
-        )]
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked: at most 1e8")]
         let n = steps as u32;
-        (0..n)
-            .map(|i| self.start + f64::from(i) * self.step)
-            .chain([self.stop])
-            .collect()
+        (0..n).map(|i| self.start + f64::from(i) * self.step).chain([self.stop]).collect()
     }
 }
 
@@ -206,11 +168,7 @@ impl StartValue {
                 None => None,
             },
         };
-        let coded = coded.ok_or_else(|| JobError::Value {
-            vr: *vr,
-            kind: *kind,
-            value: value.clone(),
-        })?;
+        let coded = coded.ok_or_else(|| JobError::Value { vr: *vr, kind: *kind, value: value.clone() })?;
         Ok((*vr, coded))
     }
 }
@@ -267,9 +225,7 @@ mod tests {
             ("String", r#""a\u0000b""#),
         ] {
             let set = format!(r#""set": [{{"vr": 77, "type": "{kind}", "value": {value}}}], "stop""#);
-            let error = Job::parse(&LEAST.replace(r#""stop""#, &set))
-                .unwrap_err()
-                .to_string();
+            let error = Job::parse(&LEAST.replace(r#""stop""#, &set)).unwrap_err().to_string();
             assert!(error.contains("77"), "{error}");
         }
     }
@@ -292,25 +248,15 @@ mod tests {
     /// `start + i H`, ending exactly at `stop`; a rest is a shorter last step, rounding is none.
     #[test]
     fn communication_points_end_at_stop() {
-        for (start, stop, step, count) in [
-            (0.0, 1.0, 0.25, 5),
-            (0.0, 10.0, 0.05, 201),
-            (1.0, 2.05, 0.1, 12),
-            (0.0, 1.0, 3.0, 2),
-        ] {
+        for (start, stop, step, count) in
+            [(0.0, 1.0, 0.25, 5), (0.0, 10.0, 0.05, 201), (1.0, 2.05, 0.1, 12), (0.0, 1.0, 3.0, 2)]
+        {
             let mut job = Job::parse(LEAST).unwrap();
             (job.start, job.stop, job.step) = (start, stop, step);
             let points = job.points();
             assert_eq!(points.len(), count);
-            assert_eq!(
-                (points[0].to_bits(), points[count - 1].to_bits()),
-                (start.to_bits(), stop.to_bits())
-            );
-            assert!(
-                points
-                    .windows(2)
-                    .all(|p| p[1] > p[0] && p[1] - p[0] < step * (1.0 + 1e-9))
-            );
+            assert_eq!((points[0].to_bits(), points[count - 1].to_bits()), (start.to_bits(), stop.to_bits()));
+            assert!(points.windows(2).all(|p| p[1] > p[0] && p[1] - p[0] < step * (1.0 + 1e-9)));
         }
     }
 }

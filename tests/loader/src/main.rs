@@ -36,10 +36,7 @@ fn work() -> Result<String, Failure> {
     let mut text = String::new();
     match std::env::args_os().nth(1) {
         Some(path) => text = std::fs::read_to_string(&path).map_err(|e| Failure::job(&e))?,
-        None => std::io::stdin()
-            .read_to_string(&mut text)
-            .map(|_| ())
-            .map_err(|e| Failure::job(&e))?,
+        None => std::io::stdin().read_to_string(&mut text).map(|_| ()).map_err(|e| Failure::job(&e))?,
     }
     let job = Job::parse(&text).map_err(|e| Failure::job(&e))?;
     match job.mode {

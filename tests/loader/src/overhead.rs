@@ -55,10 +55,7 @@ pub(crate) fn overhead(job: &Job) -> Result<OverheadAnswer, Failure> {
         };
         fmi.get_float64(&job.input_vrs, &mut inputs)?;
         let get_ns = batch(&mut || fmi.get_float64(&job.get, &mut values), job.get.len())?;
-        let set_ns = batch(
-            &mut || fmi.set_float64(&job.input_vrs, &inputs),
-            job.input_vrs.len(),
-        )?;
+        let set_ns = batch(&mut || fmi.set_float64(&job.input_vrs, &inputs), job.input_vrs.len())?;
         Ok(OverheadAnswer {
             status: "OK",
             steps: points.len() - 1,

@@ -42,11 +42,7 @@ pub(crate) fn run(job: &Job) -> Result<RunAnswer, Failure> {
         let mut counts = vec![0; job.count.len()];
         fmi.get_int64(&job.count, &mut counts)?;
 
-        let samples = if job.sample_every > 0 {
-            record(fmi, job, &points)?
-        } else {
-            Vec::new()
-        };
+        let samples = if job.sample_every > 0 { record(fmi, job, &points)? } else { Vec::new() };
 
         let mut runs = 0;
         let mut measured = Vec::with_capacity(job.repeat);

@@ -45,15 +45,11 @@ where
     O: Ode<N, Error = Infallible>,
     E: Indicators<N, M>,
 {
-    solver
-        .advance_until(ode, events, t, t_end, x, &mut Statistics::default())
-        .expect("smooth problem")
+    solver.advance_until(ode, events, t, t_end, x, &mut Statistics::default()).expect("smooth problem")
 }
 
 #[track_caller]
 pub(crate) fn event<const M: usize>(reached: Reached<M>) -> (f64, [Crossing; M]) {
-    let Reached::Event { t, which } = reached else {
-        panic!("no event")
-    };
+    let Reached::Event { t, which } = reached else { panic!("no event") };
     (t, which)
 }

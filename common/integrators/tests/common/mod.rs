@@ -9,22 +9,13 @@ use std::convert::Infallible;
 /// A solver that does each call of length up to `step` in one step: Dopri5 with tolerances that any step meets.
 pub(crate) fn fixed(method: Method, step: f64) -> Solver {
     let mut solver = solver(method, step, 1e9);
-    solver.restore(Memory {
-        step,
-        ..Memory::default()
-    });
+    solver.restore(Memory { step, ..Memory::default() });
     solver
 }
 
 /// A solver with `rtol = atol = tolerance`.
 pub(crate) fn solver(method: Method, step: f64, tolerance: f64) -> Solver {
-    Solver::new(Settings {
-        method,
-        step,
-        rtol: tolerance,
-        atol: tolerance,
-    })
-    .expect("valid settings")
+    Solver::new(Settings { method, step, rtol: tolerance, atol: tolerance }).expect("valid settings")
 }
 
 /// Runs `x` over `n` calls of equal length.
@@ -42,9 +33,7 @@ where
     let mut statistics = Statistics::default();
     let time = |i: u32| t + (t_end - t) * f64::from(i) / f64::from(n);
     for i in 0..n {
-        solver
-            .advance(ode, time(i), time(i + 1), &mut x, &mut statistics)
-            .expect("smooth problem");
+        solver.advance(ode, time(i), time(i + 1), &mut x, &mut statistics).expect("smooth problem");
     }
     assert_eq!(statistics.steps, u64::from(n), "one step per call");
     x
@@ -52,18 +41,12 @@ where
 
 /// Least-squares slope of `log error` over `log h` for `h`, `h/2`, `h/4`, ...
 pub(crate) fn slope(errors: &[f64]) -> f64 {
-    let points: Vec<(f64, f64)> = errors
-        .iter()
-        .zip(0_i32..)
-        .map(|(e, i)| (f64::from(-i), e.log2()))
-        .collect();
+    let points: Vec<(f64, f64)> =
+        errors.iter().zip(0_i32..).map(|(e, i)| (f64::from(-i), e.log2())).collect();
     let n = points.iter().map(|_| 1.0).sum::<f64>();
-    let (x, y) = points
-        .iter()
-        .fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
-    let (xy, xx) = points.iter().fold((0.0, 0.0), |(xy, xx), p| {
-        (xy + (p.0 - x) * (p.1 - y), xx + (p.0 - x).powi(2))
-    });
+    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    let (xy, xx) =
+        points.iter().fold((0.0, 0.0), |(xy, xx), p| (xy + (p.0 - x) * (p.1 - y), xx + (p.0 - x).powi(2)));
     xy / xx
 }
 
@@ -72,10 +55,7 @@ pub(crate) fn slope(errors: &[f64]) -> f64 {
 pub(crate) fn assert_order(errors: &[f64], order: f64) {
     let measured = slope(errors);
     eprintln!("order {measured:.3} (promised {order}), errors {errors:?}");
-    assert!(
-        (measured - order).abs() < 0.15,
-        "order {measured:.3}, errors {errors:?}"
-    );
+    assert!((measured - order).abs() < 0.15, "order {measured:.3}, errors {errors:?}");
 }
 
 pub(crate) fn distance<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
@@ -162,9 +142,7 @@ pub(crate) struct Linear {
 
 impl Linear {
     /// `omega^2`-oscillator, undamped.
-    pub(crate) const OSCILLATOR: Self = Self {
-        a: [[0.0, 1.0], [-1.0, 0.0]],
-    };
+    pub(crate) const OSCILLATOR: Self = Self { a: [[0.0, 1.0], [-1.0, 0.0]] };
 
     /// Half trace `s` and discriminant `q` of the eigenvalues `s +- sqrt(q)`.
     pub(crate) fn spectrum(&self) -> (f64, f64) {

@@ -1,10 +1,14 @@
 //! What the coordinates of a joint are called: as a link (angles of the axis joint - tip) and as a
 //! carrier (rotation from the design position).
 
-use mechanics::{Joint, Planar, Scalar, Spatial};
-use model::Vector3;
+use mechanics::{Joint, Planar, Rigid, Scalar, Spatial};
+use model::{ParameterError, Vector3};
 
+use super::double_wishbone::refused;
 use super::variables::{CarrierOrientation, LinkAngles};
+
+/// Start values may be off their manifold by this much.
+const START_TOLERANCE: f64 = 1e-6;
 
 /// Every orientation variable; those of other joint kinds have their start values.
 #[derive(Debug, Clone, Copy)]
@@ -22,46 +26,32 @@ pub(super) struct Orientation<S> {
 }
 
 impl<S: Scalar> Orientation<S> {
+    /// All coordinates at their start values.
+    pub(super) fn unused() -> Self {
+        let o = S::lift(0.0);
+        Self {
+            psi: o,
+            phi: o,
+            theta: o,
+            psi_dot: o,
+            phi_dot: o,
+            theta_dot: o,
+            q: [S::lift(1.0), o, o, o],
+            direction: Vector3::new(S::lift(1.0), o, o),
+            omega: Vector3::new(o, o, o),
+        }
+    }
+
     /// As the angles of a link.
     pub(super) fn link(self) -> LinkAngles<S> {
-        let Self {
-            theta,
-            phi,
-            theta_dot,
-            phi_dot,
-            ..
-        } = self;
-        LinkAngles {
-            theta,
-            phi,
-            theta_dot,
-            phi_dot,
-        }
+        let Self { theta, phi, theta_dot, phi_dot, .. } = self;
+        LinkAngles { theta, phi, theta_dot, phi_dot }
     }
 
     /// As the orientation of a carrier.
     pub(super) fn carrier(self) -> CarrierOrientation<S> {
-        let Self {
-            psi,
-            phi,
-            theta,
-            psi_dot,
-            phi_dot,
-            theta_dot,
-            q,
-            omega,
-            ..
-        } = self;
-        CarrierOrientation {
-            psi,
-            phi,
-            theta,
-            psi_dot,
-            phi_dot,
-            theta_dot,
-            q,
-            omega,
-        }
+        let Self { psi, phi, theta, psi_dot, phi_dot, theta_dot, q, omega, .. } = self;
+        CarrierOrientation { psi, phi, theta, psi_dot, phi_dot, theta_dot, q, omega }
     }
 }
 
@@ -86,40 +76,45 @@ pub(super) trait Coordinates<const D: usize, const N: usize>: Joint<D, N> {
     fn orientation<S: Scalar>(&self, x: &[S], carrier: bool) -> Orientation<S>;
     /// The states from orientation variables; `carrier`: the angle is psi.
     fn states_of(&self, o: &Orientation<f64>, x: &mut [f64], carrier: bool);
-}
 
-/// The orientation whose coordinates all keep their start values.
-fn unused<S: Scalar>() -> Orientation<S> {
-    let o = S::lift(0.0);
-    let (zero, x_axis) = (Vector3::new(o, o, o), Vector3::new(S::lift(1.0), o, o));
-    Orientation {
-        psi: o,
-        phi: o,
-        theta: o,
-        psi_dot: o,
-        phi_dot: o,
-        theta_dot: o,
-        q: [S::lift(1.0), o, o, o],
-        direction: x_axis,
-        omega: zero,
+    /// The same for start values: a quaternion or unit vector that is off by more than 1e-6 is
+    /// refused, less is rounding and taken away.
+    ///
+    /// # Errors
+    /// [`ParameterError::Refused`].
+    fn checked_start(
+        &self,
+        o: &Orientation<f64>,
+        x: &mut [f64],
+        carrier: bool,
+    ) -> Result<(), ParameterError> {
+        self.states_of(o, x, carrier);
+        let off = self.off_manifold(x);
+        if off > START_TOLERANCE {
+            let quaternion = self.link_names().iter().any(|n| n.starts_with("orientation"));
+            let (name, allowed) = if quaternion {
+                ("orientation.q", "a norm within 1e-6 of 1")
+            } else {
+                ("direction", "a norm within 1e-6 of 1, and omega across it")
+            };
+            return Err(refused(name, off, "off its manifold by this much", allowed));
+        }
+        self.normalise(x);
+        Ok(())
+    }
+
+    /// Inertia about the first axis of a universal joint over the largest one; 1 for other joints.
+    fn singularity<S: Scalar>(&self, _rigid: &Rigid<D>, _x: &[S]) -> S {
+        S::lift(1.0)
     }
 }
 
 /// One angle, of a carrier or of a link at the azimuth `phi`.
 fn single_angle<S: Scalar>(x: &[S], phi: S, carrier: bool) -> Orientation<S> {
     if carrier {
-        Orientation {
-            psi: x[0],
-            psi_dot: x[1],
-            ..unused()
-        }
+        Orientation { psi: x[0], psi_dot: x[1], ..Orientation::unused() }
     } else {
-        Orientation {
-            theta: x[0],
-            theta_dot: x[1],
-            phi,
-            ..unused()
-        }
+        Orientation { theta: x[0], theta_dot: x[1], phi, ..Orientation::unused() }
     }
 }
 
@@ -140,11 +135,7 @@ impl Coordinates<2, 1> for Planar {
         single_angle(x, S::lift(0.0), carrier)
     }
     fn states_of(&self, o: &Orientation<f64>, x: &mut [f64], carrier: bool) {
-        let states = if carrier {
-            [o.psi, o.psi_dot]
-        } else {
-            [o.theta, o.theta_dot]
-        };
+        let states = if carrier { [o.psi, o.psi_dot] } else { [o.theta, o.theta_dot] };
         x.copy_from_slice(&states);
     }
 }
@@ -163,14 +154,9 @@ impl Coordinates<3, 3> for Spatial {
                 "omega.y",
                 "omega.z",
             ],
-            Self::SphericalRod => &[
-                "direction.x",
-                "direction.y",
-                "direction.z",
-                "omega.x",
-                "omega.y",
-                "omega.z",
-            ],
+            Self::SphericalRod => {
+                &["direction.x", "direction.y", "direction.z", "omega.x", "omega.y", "omega.z"]
+            }
         }
     }
     fn carrier_names(&self) -> &'static [&'static str] {
@@ -206,19 +192,28 @@ impl Coordinates<3, 3> for Spatial {
                 theta: x[1],
                 phi_dot: x[2],
                 theta_dot: x[3],
-                ..unused()
+                ..Orientation::unused()
             },
             Self::Spherical => Orientation {
                 q: [x[0], x[1], x[2], x[3]],
                 omega: Vector3::new(x[4], x[5], x[6]),
-                ..unused()
+                ..Orientation::unused()
             },
             Self::SphericalRod => Orientation {
                 direction: Vector3::new(x[0], x[1], x[2]),
                 omega: Vector3::new(x[3], x[4], x[5]),
-                ..unused()
+                ..Orientation::unused()
             },
         }
+    }
+    fn singularity<S: Scalar>(&self, rigid: &Rigid<3>, x: &[S]) -> S {
+        if *self != Self::Universal {
+            return S::lift(1.0);
+        }
+        let J_x = rigid.I_c[(0, 0)];
+        let J_z = rigid.I_c[(2, 2)] + rigid.m * rigid.c.x * rigid.c.x;
+        let (st, ct) = x[1].sin_cos();
+        (st * st * J_x + ct * ct * J_z) / J_z
     }
     fn states_of(&self, o: &Orientation<f64>, x: &mut [f64], carrier: bool) {
         match self {
@@ -235,4 +230,16 @@ impl Coordinates<3, 3> for Spatial {
             }
         }
     }
+}
+
+/// Names of the states of an element: its coordinates and rates, then the energy integrals.
+pub(super) fn state_names<const X: usize>(own: &[&str]) -> [String; X] {
+    let energies = ["energy.dissipated", "energy.supplied", "energy.port"];
+    std::array::from_fn(|i| (*own.get(i).unwrap_or_else(|| &energies[i - own.len()])).to_string())
+}
+
+/// Typical magnitudes: energy integrals are quadratures, they follow the states and do not choose
+/// the step.
+pub(super) fn nominals<const X: usize>(mechanical: usize) -> [f64; X] {
+    std::array::from_fn(|i| if i < mechanical { 1.0 } else { f64::INFINITY })
 }

@@ -28,6 +28,7 @@ pub struct DoubleWishbone {
 }
 
 /// In the plane or in space.
+#[allow(clippy::large_enum_variant, reason = "one per instance, and the hot path must not follow a pointer")]
 #[derive(Debug, Clone)]
 enum Structure {
     Planar(Wishbone<Planar, 2, 1>),
@@ -47,10 +48,7 @@ macro_rules! each {
 impl Model for DoubleWishbone {
     const NAME: &'static str = "double_wishbone";
     const DESCRIPTION: &'static str = "Double wishbone wheel suspension: two links, carrier with wheel, strut, closed at the upper chassis joint";
-    const EXPERIMENT: Experiment = Experiment {
-        stop: 10.0,
-        step: 0.05,
-    };
+    const EXPERIMENT: Experiment = Experiment { stop: 10.0, step: 0.05 };
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;
@@ -75,10 +73,7 @@ impl Model for DoubleWishbone {
                 Structure::Spatial(Wishbone::new(p, arm, carrier)?)
             }
         };
-        Ok(Self {
-            structure,
-            parameters: p.clone(),
-        })
+        Ok(Self { structure, parameters: p.clone() })
     }
 
     fn retune(&mut self, p: &Parameters) {
@@ -121,10 +116,7 @@ impl Model for DoubleWishbone {
     }
 
     fn for_model_exchange(&mut self) {
-        let terms = Baumgarte {
-            a: self.parameters.stabilisation_a,
-            b: self.parameters.stabilisation_b,
-        };
+        let terms = Baumgarte { a: self.parameters.stabilisation_a, b: self.parameters.stabilisation_b };
         each!(&mut self.structure, w => if let Closing::Projection = w.closing {
             w.closing = Closing::Baumgarte(terms);
         });
@@ -137,12 +129,7 @@ pub(super) fn refused(
     reason: impl Into<String>,
     allowed: impl Into<String>,
 ) -> ParameterError {
-    ParameterError::Refused {
-        variable,
-        value,
-        reason: reason.into(),
-        allowed: allowed.into(),
-    }
+    ParameterError::Refused { variable, value, reason: reason.into(), allowed: allowed.into() }
 }
 
 /// Conditions between parameters.
@@ -185,42 +172,38 @@ fn check(p: &Parameters) -> Result<(), ParameterError> {
                 return Err(refused(name, point.y, "scene.motion = planar moves in x-z", "0"));
             }
         }
-        return positive_inertia(p.carrier_inertia.yy);
+        return positive_inertia("carrier.inertia", p.carrier_inertia.yy);
     }
-    let moments = p.carrier_inertia.matrix().symmetric_eigenvalues();
-    positive_inertia(moments.min())?;
-    let excess = 2.0 * moments.max() - moments.sum();
-    if excess > 1e-12 * moments.max() {
-        let largest = moments.max();
-        return Err(refused(
-            "carrier.inertia",
-            largest,
-            format!("the largest principal moment exceeds the sum of the others by {excess:.3e} kg.m2"),
-            "principal moments that satisfy the triangle inequality",
-        ));
+    check_inertia("carrier.inertia", &p.carrier_inertia)
+}
+
+/// A tensor that a rigid body can have.
+pub(super) fn check_inertia(
+    name: &'static str,
+    inertia: &SymmetricTensor<f64>,
+) -> Result<(), ParameterError> {
+    let moments = inertia.matrix().symmetric_eigenvalues();
+    positive_inertia(name, moments.min())?;
+    let largest = moments.max();
+    let excess = 2.0 * largest - moments.sum();
+    if excess > 1e-12 * largest {
+        let reason =
+            format!("the largest principal moment exceeds the sum of the others by {excess:.3e} kg.m2");
+        return Err(refused(name, largest, reason, "principal moments that satisfy the triangle inequality"));
     }
     Ok(())
 }
 
-fn positive_inertia(smallest: f64) -> Result<(), ParameterError> {
+pub(super) fn positive_inertia(name: &'static str, smallest: f64) -> Result<(), ParameterError> {
     if smallest > 0.0 {
         return Ok(());
     }
-    Err(refused(
-        "carrier.inertia",
-        smallest,
-        "the smallest principal moment is not positive",
-        "positive definite",
-    ))
+    Err(refused(name, smallest, "the smallest principal moment is not positive", "positive definite"))
 }
 
 /// Azimuth and elevation of a link vector; in the plane the azimuth is zero.
 fn link_angles(r: &Vector3<f64>) -> (f64, f64) {
-    if r.y.vanishes() {
-        (0.0, r.z.atan2(r.x))
-    } else {
-        (r.y.atan2(r.x), r.z.atan2(r.x.hypot(r.y)))
-    }
+    if r.y.vanishes() { (0.0, r.z.atan2(r.x)) } else { (r.y.atan2(r.x), r.z.atan2(r.x.hypot(r.y))) }
 }
 
 impl<J, const D: usize, const N: usize> Wishbone<J, D, N>
@@ -228,81 +211,49 @@ where
     J: Coordinates<D, N>,
     Dim<D>: Space<D>,
 {
-    fn new(p: &Parameters, arm: impl Fn(f64) -> J, carrier: J) -> Result<Self, ParameterError> {
+    /// The three elements; `bushed`: the upper link hangs at C instead of D.
+    fn elements(p: &Parameters, [lower, carrier, upper]: [J; 3], bushed: bool) -> Assembly<J, D, N, 3, 1, 1> {
         let part = |v: Vector3<f64>| Dim::<D>::restrict(&v);
         let along = |x: f64| part(Vector3::new(x, 0.0, 0.0));
         let (L_1, L_3) = ((p.B - p.A).norm(), (p.C - p.D).norm());
-        let rod = |m: f64, L: f64, Ixx: f64| {
+        let rod = |m: f64, L: f64, Ixx: f64, root: f64| {
             let across = m * L * L / 12.0;
-            Rigid {
-                m,
-                c: along(0.5 * L),
-                I_c: SymmetricTensor::diagonal(Ixx, across, across).matrix(),
-            }
+            let I_c = SymmetricTensor::diagonal(Ixx, across, across).matrix();
+            Rigid { m, c: along(0.5 * L - root), I_c }
         };
+        let r_BC = part(p.C - p.B);
+        let (root, hangs_on) =
+            if bushed { (L_3, Parent::Element(CARRIER, r_BC)) } else { (0.0, Parent::Root(1)) };
+        let body = Rigid { m: p.carrier_mass, c: part(p.G - p.B), I_c: p.carrier_inertia.matrix() };
+        let member = |joint, rigid, parent| Member { joint, rigid, parent };
+        Assembly {
+            members: [
+                member(lower, rod(p.lower_mass, L_1, p.lower_Ixx, 0.0), Parent::Root(0)),
+                member(carrier, body, Parent::Element(LOWER, along(L_1))),
+                member(upper, rod(p.upper_mass, L_3, p.upper_Ixx, root), hangs_on),
+            ],
+            closures: [ClosingJoint {
+                first: Place { element: CARRIER, point: r_BC },
+                second: Place { element: UPPER, point: along(L_3) },
+            }],
+            closed: usize::from(!bushed),
+        }
+    }
+
+    fn new(p: &Parameters, arm: impl Fn(f64) -> J, carrier: J) -> Result<Self, ParameterError> {
+        let part = |v: Vector3<f64>| Dim::<D>::restrict(&v);
+        let along = |x: f64| part(Vector3::new(x, 0.0, 0.0));
+        let L_3 = (p.C - p.D).norm();
         let (design_lower, design_upper) = (link_angles(&(p.B - p.A)), link_angles(&(p.C - p.D)));
         let foot = p.D + (p.C - p.D) * (p.s1 / L_3);
-        let l0 = if p.strut_l0 > 0.0 {
-            p.strut_l0
-        } else {
-            (p.T - foot).norm()
-        };
+        let l0 = if p.strut_l0 > 0.0 { p.strut_l0 } else { (p.T - foot).norm() };
         let bushed = p.closure == ClosureKind::Bushing;
-        let (r_AB, r_BC, r_DC) = (along(L_1), part(p.C - p.B), along(L_3));
-        let upper_rod = rod(p.upper_mass, L_3, p.upper_Ixx);
-        let assembly = |bushed: bool| {
-            // the upper link hangs at D, with a bushing at C: body vectors from there
-            let (root, parent) = if bushed {
-                (r_DC, Parent::Element(CARRIER, r_BC))
-            } else {
-                (along(0.0), Parent::Root(1))
-            };
-            Assembly {
-                members: [
-                    Member {
-                        joint: arm(design_lower.0),
-                        rigid: rod(p.lower_mass, L_1, p.lower_Ixx),
-                        parent: Parent::Root(0),
-                    },
-                    Member {
-                        joint: carrier,
-                        rigid: Rigid {
-                            m: p.carrier_mass,
-                            c: part(p.G - p.B),
-                            I_c: p.carrier_inertia.matrix(),
-                        },
-                        parent: Parent::Element(LOWER, r_AB),
-                    },
-                    Member {
-                        joint: arm(design_upper.0),
-                        rigid: Rigid {
-                            c: upper_rod.c - root,
-                            ..upper_rod
-                        },
-                        parent,
-                    },
-                ],
-                closures: [ClosingJoint {
-                    first: Place {
-                        element: CARRIER,
-                        point: r_BC,
-                    },
-                    second: Place {
-                        element: UPPER,
-                        point: r_DC,
-                    },
-                }],
-                closed: usize::from(!bushed),
-            }
-        };
-        let root = if bushed { r_DC } else { along(0.0) };
-        let baumgarte = Baumgarte {
-            a: p.stabilisation_a,
-            b: p.stabilisation_b,
-        };
+        let joints = [arm(design_lower.0), carrier, arm(design_upper.0)];
+        let root = along(if bushed { L_3 } else { 0.0 });
+        let baumgarte = Baumgarte { a: p.stabilisation_a, b: p.stabilisation_b };
         let mut w = Self {
-            assembly: assembly(bushed),
-            rigid: assembly(false),
+            assembly: Self::elements(p, joints, bushed),
+            rigid: Self::elements(p, joints, false),
             r_BP: part(p.P - p.B),
             r_BR: part(p.tie_R - p.B),
             r_S: along(p.s1) - root,
@@ -311,12 +262,7 @@ where
             r_D: part(p.D),
             r_T: part(p.T),
             r_tie: part(p.tie_T),
-            strut: SpringDamper {
-                k: 0.0,
-                c: None,
-                l0,
-                F_pre: 0.0,
-            },
+            strut: SpringDamper { k: 0.0, c: None, l0, F_pre: 0.0 },
             tie: p.use_tie.then(|| SpringDamper {
                 k: 0.0,
                 c: None,
@@ -326,10 +272,7 @@ where
             gravity: None,
             load: (p.force_kind == ForceKind::Internal).then(|| LoadLaw::new(&p.force)),
             closing: match (p.closure, p.stabilisation) {
-                (ClosureKind::Bushing, _) => Closing::Bushing {
-                    k: p.closure_k,
-                    c: p.closure_c,
-                },
+                (ClosureKind::Bushing, _) => Closing::Bushing { k: p.closure_k, c: p.closure_c },
                 (_, StabilisationKind::None) => Closing::Rigid,
                 (_, StabilisationKind::Baumgarte) => Closing::Baumgarte(baumgarte),
                 (_, StabilisationKind::Projection) => Closing::Projection,
@@ -378,12 +321,7 @@ where
         ] {
             if value != default {
                 let reason = "the start follows from the design points while start.override = false";
-                return Err(refused(
-                    variable,
-                    value,
-                    reason,
-                    format!("{default}, or start.override = true"),
-                ));
+                return Err(refused(variable, value, reason, format!("{default}, or start.override = true")));
             }
         }
         self.design_states(x);
@@ -441,11 +379,7 @@ where
         let k = self.kinematics(x)?;
         let mut states: [&[S]; 3] = [&[]; 3];
         self.assembly.each(x, |i, own| states[i] = own);
-        let orientation = |i: usize| {
-            self.assembly.members[i]
-                .joint
-                .orientation(states[i], i == CARRIER)
-        };
+        let orientation = |i: usize| self.assembly.members[i].joint.orientation(states[i], i == CARRIER);
         let lower = orientation(LOWER).link();
         let world = |v: Vector<S, D>| Dim::<D>::embed(&v);
         let carrier = |p| k.elements.motion(CARRIER, p);
@@ -523,45 +457,28 @@ where
     ) -> Result<Energy<S>, EvaluationError> {
         let (kinetic, potential) = self.energies(&self.kinematics(x)?);
         let [dissipated, supplied, port] = [0, 1, 2].map(|i| x[self.mechanical() + i]);
-        Ok(Energy {
-            kinetic,
-            potential,
-            dissipated,
-            supplied,
-            port,
-        })
+        Ok(Energy { kinetic, potential, dissipated, supplied, port })
     }
 
     fn state_names(&self) -> [String; X] {
         let mut names = Vec::with_capacity(X);
         for (i, element) in ["lower", "carrier", "upper"].iter().enumerate() {
             let joint = &self.assembly.members[i].joint;
-            let own = if i == CARRIER {
-                joint.carrier_names()
-            } else {
-                joint.link_names()
-            };
-            names.extend(
-                own.iter()
-                    .map(|n| format!("{element}.{}", n.trim_start_matches("orientation."))),
-            );
+            let own = if i == CARRIER { joint.carrier_names() } else { joint.link_names() };
+            names.extend(own.iter().map(|n| format!("{element}.{}", n.trim_start_matches("orientation."))));
         }
         names.extend(["dissipated", "supplied", "port"].map(|n| format!("energy.{n}")));
         std::array::from_fn(|i| names[i].clone())
     }
 
     fn nominals(&self) -> [f64; X] {
-        // energy integrals are quadratures: they follow the states and do not choose the step
-        std::array::from_fn(|i| if i < self.mechanical() { 1.0 } else { f64::INFINITY })
+        super::coordinates::nominals(self.mechanical())
     }
 
     fn project(&self, _t: f64, x: &mut [f64; X]) -> Result<bool, EvaluationError> {
         let x = &mut x[..self.mechanical()];
         match self.closing {
-            Closing::Projection => self
-                .assembly
-                .project(x, |number| self.root(number))
-                .map_err(named),
+            Closing::Projection => self.assembly.project(x, |number| self.root(number)).map_err(named),
             _ => Ok(self.assembly.normalise(x)),
         }
     }
@@ -586,9 +503,5 @@ where
 /// Length of a vector, smooth enough at zero for dual numbers.
 fn magnitude<S: Scalar, const D: usize>(v: &Vector<S, D>) -> S {
     let squared = v.dot(v);
-    if squared.re().vanishes() {
-        S::lift(0.0)
-    } else {
-        squared.sqrt()
-    }
+    if squared.re().vanishes() { S::lift(0.0) } else { squared.sqrt() }
 }

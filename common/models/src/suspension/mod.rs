@@ -11,16 +11,25 @@
 
 mod coordinates;
 mod double_wishbone;
+mod element;
+pub mod link2;
+pub mod link3;
 mod load;
 mod parameters;
+mod rod;
 mod start;
+pub mod strut_link;
 mod variables;
 mod wishbone;
 
 pub use double_wishbone::DoubleWishbone;
+pub use link2::Link2;
+pub use link3::Link3;
 pub use load::PulsePhase;
 pub use parameters::{
     ArmJoint, CarrierJoint, ClosureKind, ForceKind, LoadParameters, Parameters, PreloadMode, SceneMotion,
     StabilisationKind,
 };
+pub use rod::RodParameters;
+pub use strut_link::StrutLink;
 pub use variables::{Dynamics, Energy, Inputs, Motion};

@@ -41,11 +41,7 @@ where
         let joint = self.assembly.members[LOWER].joint;
         let (phi, from) = self.design_lower;
         let way = given.lower_theta - from;
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a small count"
-        )]
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small count")]
         let steps = (way.abs() / CONTINUATION_STEP).ceil().clamp(1.0, 1e4) as u32;
         let rate = joint.coordinates() + joint.elevation();
         for i in 1..=steps {
@@ -54,16 +50,14 @@ where
             if i == steps {
                 x[rate] = given.lower_theta_dot;
             }
-            self.rigid
-                .close_loops(x, |number| self.root(number), LOWER)
-                .map_err(|error| {
-                    refused(
-                        "lower.angle.theta",
-                        given.lower_theta,
-                        format!("the loop cannot close at {theta:.6} rad: {error}"),
-                        format!("angles that the upper link can follow from {from:.6} rad"),
-                    )
-                })?;
+            self.rigid.close_loops(x, |number| self.root(number), LOWER).map_err(|error| {
+                refused(
+                    "lower.angle.theta",
+                    given.lower_theta,
+                    format!("the loop cannot close at {theta:.6} rad: {error}"),
+                    format!("angles that the upper link can follow from {from:.6} rad"),
+                )
+            })?;
         }
         Ok(())
     }
@@ -73,11 +67,7 @@ where
         let mut x = [0.0; MANY];
         let x = &mut x[..self.assembly.states()];
         self.design_states(x);
-        let loads = Loads {
-            port: None,
-            internal: Some(*static_load),
-            field: self.gravity,
-        };
+        let loads = Loads { port: None, internal: Some(*static_load), field: self.gravity };
         let elevation = self.assembly.members[LOWER].joint.elevation();
         let acceleration = |F_pre: f64| -> Result<f64, EvaluationError> {
             let mut trial = *self;

@@ -16,6 +16,21 @@ pub struct Slot<S> {
     pub M: SymmetricTensor<S>,
 }
 
+/// A follower port's motion: given by the leader.
+#[derive(Debug, Clone, Copy, PartialEq, Variables)]
+#[variables(input)]
+pub struct Root<S> {
+    /// Position of the root port [m]
+    #[var(name = "r")]
+    pub r: Vector3<S>,
+    /// Velocity of the root port [m/s]
+    #[var(name = "v")]
+    pub v: Vector3<S>,
+    /// Acceleration of the root port [m/s2]
+    #[var(name = "a")]
+    pub a: Vector3<S>,
+}
+
 /// Inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
 #[variables(input)]
@@ -187,6 +202,27 @@ pub struct Energy<S> {
     #[var(name = "energy.supplied")]
     pub supplied: S,
     /// Work through port P since the start [J]
+    #[var(name = "energy.port")]
+    pub port: S,
+}
+
+/// Energies of an element on a moving root; the root port is A, B or D.
+#[derive(Debug, Clone, Copy, PartialEq, Variables)]
+#[variables(output)]
+pub struct ElementEnergy<S> {
+    /// Kinetic energy [J]
+    #[var(name = "energy.kinetic", depends = ["A.v", "B.v", "D.v"])]
+    pub kinetic: S,
+    /// Potential energy of gravity and spring [J]
+    #[var(name = "energy.potential", depends = ["A.r", "B.r", "D.r", "T.r"])]
+    pub potential: S,
+    /// Energy turned into heat by the damper since the start [J]
+    #[var(name = "energy.dissipated")]
+    pub dissipated: S,
+    /// Work of all loads, of the root and of the drive on the element since the start [J]
+    #[var(name = "energy.supplied")]
+    pub supplied: S,
+    /// Work through the ports since the start [J]
     #[var(name = "energy.port")]
     pub port: S,
 }

@@ -99,9 +99,7 @@ pub(super) fn slots<S: Scalar, const D: usize>(slots: &[&Slot<S>]) -> Option<Loa
 where
     Dim<D>: Space<D>,
 {
-    let F = slots
-        .iter()
-        .fold(Vector::<S, D>::zeros(), |sum, s| sum + Dim::<D>::restrict(&s.F));
+    let F = slots.iter().fold(Vector::<S, D>::zeros(), |sum, s| sum + Dim::<D>::restrict(&s.F));
     let M = slots.iter().filter(|s| !s.M.vanishes()).map(|s| {
         let m = &s.M;
         Dim::<D>::restrict_tensor(m.xx, m.xy, m.xz, m.yy, m.yz, m.zz)
@@ -113,10 +111,9 @@ where
 /// Names of the elements for messages.
 pub(super) fn named(error: AssemblyError) -> EvaluationError {
     match error {
-        AssemblyError::Inertia { element, source } => EvaluationError::Inertia {
-            element: ["lower link", "carrier", "upper link"][element],
-            source,
-        },
+        AssemblyError::Inertia { element, source } => {
+            EvaluationError::Inertia { element: ["lower link", "carrier", "upper link"][element], source }
+        }
         AssemblyError::Closure(closure) => closure.into(),
     }
 }
@@ -143,9 +140,8 @@ where
     /// Positions and velocities.
     #[inline]
     pub(super) fn kinematics<S: Scalar>(&self, x: &[S]) -> Result<KinematicsOf<S, J, D, N>, EvaluationError> {
-        let elements = self
-            .assembly
-            .kinematics(x, |number| (self.root(number).map(S::lift), Vector::zeros()));
+        let elements =
+            self.assembly.kinematics(x, |number| (self.root(number).map(S::lift), Vector::zeros()));
         let P = elements.poses[CARRIER].point(&self.r_BP);
         let foot = elements.poses[UPPER].point(&self.r_S);
         let gaps = self.assembly.gaps(&elements);
@@ -163,24 +159,10 @@ where
             Some(tie) => {
                 let R = elements.poses[CARRIER].point(&self.r_BR);
                 let (r_R, v_R) = elements.motion(CARRIER, &R);
-                Some((
-                    R,
-                    span(tie, "tie rod length", &(self.r_tie.map(S::lift) - r_R), &-v_R)?,
-                ))
+                Some((R, span(tie, "tie rod length", &(self.r_tie.map(S::lift) - r_R), &-v_R)?))
             }
         };
-        Ok(Kinematics {
-            elements,
-            gaps,
-            P,
-            C,
-            foot,
-            end,
-            gap,
-            gap_rate,
-            strut,
-            tie,
-        })
+        Ok(Kinematics { elements, gaps, P, C, foot, end, gap, gap_rate, strut, tie })
     }
 
     /// Loads from inputs and time.
@@ -192,11 +174,7 @@ where
             Some(g) => Some(g.map(S::lift) - a_ch),
             None => moving.then_some(-a_ch),
         };
-        Loads {
-            port: slots(&[&u.P, &u.P_2]),
-            internal: self.load.map(|law| law.force(t, pulse)),
-            field,
-        }
+        Loads { port: slots(&[&u.P, &u.P_2]), internal: self.load.map(|law| law.force(t, pulse)), field }
     }
 
     /// The elements under their loads, open at C.
@@ -242,10 +220,7 @@ where
         k: &KinematicsOf<S, J, D, N>,
         loads: &Loads<S, D>,
     ) -> Result<Matrix<S, D, D>, EvaluationError> {
-        Ok(*self
-            .assembly
-            .mobility(&k.elements, &self.tree(k, loads)?, &k.gaps)
-            .diagonal(0))
+        Ok(*self.assembly.mobility(&k.elements, &self.tree(k, loads)?, &k.gaps).diagonal(0))
     }
 
     /// Accelerations and forces under the given loads.
@@ -260,9 +235,7 @@ where
             Closing::Baumgarte(terms) => Some(terms),
             _ => None,
         };
-        self.assembly
-            .accelerate(&k.elements, tree, &k.gaps, |_| Vector::zeros(), baumgarte)
-            .map_err(named)
+        self.assembly.accelerate(&k.elements, tree, &k.gaps, |_| Vector::zeros(), baumgarte).map_err(named)
     }
 
     /// Force of the bushing on the upper link at D.
