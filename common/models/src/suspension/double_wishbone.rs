@@ -501,7 +501,7 @@ where
 }
 
 /// Length of a vector, smooth enough at zero for dual numbers.
-fn magnitude<S: Scalar, const D: usize>(v: &Vector<S, D>) -> S {
+pub(super) fn magnitude<S: Scalar, const D: usize>(v: &Vector<S, D>) -> S {
     let squared = v.dot(v);
     if squared.re().vanishes() { S::lift(0.0) } else { squared.sqrt() }
 }

@@ -10,10 +10,13 @@
 //! [`mechanics::chain`], (18) of [`mechanics::closure`].
 
 mod coordinates;
+pub mod double_pendulum;
 mod double_wishbone;
 mod element;
+pub mod four_bar;
 pub mod link2;
 pub mod link3;
+mod linkage;
 mod load;
 mod parameters;
 mod rod;
@@ -22,9 +25,12 @@ pub mod strut_link;
 mod variables;
 mod wishbone;
 
+pub use double_pendulum::DoublePendulum;
 pub use double_wishbone::DoubleWishbone;
+pub use four_bar::FourBar;
 pub use link2::Link2;
 pub use link3::Link3;
+pub use linkage::PlanarRod;
 pub use load::PulsePhase;
 pub use parameters::{
     ArmJoint, CarrierJoint, ClosureKind, ForceKind, LoadParameters, Parameters, PreloadMode, SceneMotion,
