@@ -92,6 +92,13 @@ impl Model for DoubleWishbone {
         each!(&mut self.structure, w => w.retune(p));
     }
 
+    fn for_model_exchange(&mut self) {
+        let p = &self.parameters;
+        each!(&mut self.structure, w => if let Closing::Projection = w.closing {
+            w.closing = Closing::Baumgarte { a: p.stabilisation_a, b: p.stabilisation_b };
+        });
+    }
+
     fn warnings(&self) -> Vec<String> {
         let p = &self.parameters;
         let mut warnings = vec![];
@@ -402,6 +409,21 @@ macro_rules! system {
 
             fn project(&self, _t: f64, x: &mut [f64; $n]) -> Result<bool, EvaluationError> {
                 self.project_states(x)
+            }
+
+            fn off_manifold(&self, x: &[f64; $n]) -> f64 {
+                let mut y = *x;
+                System::<$n, 0>::normalise(self, &mut y);
+                x.iter()
+                    .zip(y)
+                    .map(|(x, y)| (x - y).abs())
+                    .fold(0.0, f64::max)
+            }
+
+            fn normalise(&self, x: &mut [f64; $n]) {
+                let (_, rest) = x.split_at_mut(<$A as mechanics::Joint<$d, $na>>::STATES);
+                let states = <$C as mechanics::Joint<$d, $nc>>::STATES;
+                mechanics::Joint::normalise(&self.carrier_joint, &mut rest[..states]);
             }
 
             fn next_event(&self, d: &PulsePhase) -> Option<f64> {
