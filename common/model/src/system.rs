@@ -40,6 +40,12 @@ pub trait Model: Clone + Sized + 'static {
     const DESCRIPTION: &'static str;
     /// A sensible run
     const EXPERIMENT: Experiment;
+    /// Offered for Model Exchange too: the variables marked `state` are its continuous states
+    const MODEL_EXCHANGE: bool = true;
+    /// Inputs may follow polynomials inside a step (`port.*`); false: always held
+    const PORT_TREATMENT: bool = true;
+    /// Names of the event indicators; a system with fewer uses the first ones
+    const INDICATORS: &'static [&'static str] = &[];
     /// Constants of a run
     type Parameters: Variables<f64>;
     /// Inputs
@@ -164,7 +170,7 @@ pub trait System<const N: usize, const Z: usize> {
         d: &<Self::Model as Model>::Discrete,
     ) -> Result<<Self::Model as Model>::Energy<S>, EvaluationError>;
 
-    /// Names of the states: variables of the motion group, or energy integrals.
+    /// Names of the states: variables marked `state` in the motion and the energy group.
     fn state_names(&self) -> [String; N];
 
     /// Typical magnitude of each state for error control; infinite: does not count.
