@@ -1,7 +1,10 @@
 //! Jobs on a system whose number of states is known inside only: start, outputs, step.
 
+use std::cell::RefCell;
+
 use integrators::{
-    Complex, Indicators, Method, Ode, Reached, Solver, Statistics, StepError, largest_stable_step, violates,
+    Complex, Indicators, Jacobian, Method, Ode, Reached, Solver, Statistics, StepError, largest_stable_step,
+    violates,
 };
 use model::{
     EvaluationError, Group, Model, Outputs, ParameterError, Spectrum, System, Variables, Visitor,
@@ -58,6 +61,9 @@ impl<M: Model, S: model::Scalar> Visitor<M> for Evaluate<'_, M, S> {
 struct Driven<'a, const N: usize, const Z: usize, Y: System<N, Z>> {
     system: &'a Y,
     u: <Y::Model as Model>::Inputs<f64>,
+    /// The inputs as a list, and room for them as dual numbers
+    values: &'a [f64],
+    duals: RefCell<&'a mut [Dual64]>,
     d: <Y::Model as Model>::Discrete,
 }
 
@@ -73,6 +79,16 @@ impl<const N: usize, const Z: usize, Y: System<N, Z>> Ode<N> for Driven<'_, N, Z
     }
     fn nominal(&self) -> [f64; N] {
         self.system.nominals()
+    }
+    fn jacobian(&self, t: f64, x: &[f64; N], _f: &[f64; N]) -> Result<Jacobian<N>, EvaluationError> {
+        let duals = &mut **self.duals.borrow_mut();
+        let j = state_jacobian(self.system, t, x, self.values, duals, &self.d)?;
+        let u = <Y::Model as Model>::Inputs::<Dual64>::load(duals); // filled with the inputs by now
+        let rates = self
+            .system
+            .rates(Dual64::new(t, 1.0), &x.map(Dual64::from_re), &u, &self.d)?;
+        let rows = std::array::from_fn(|i| std::array::from_fn(|k| j[(i, k)]));
+        Ok((rows, rates.map(|rate| rate.eps)))
     }
 }
 
@@ -132,6 +148,8 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
         let mut driven = Driven {
             system,
             u: M::Inputs::<f64>::load(u),
+            values: u,
+            duals: RefCell::new(self.duals),
             d: *self.d,
         };
         let mut t = from;
@@ -187,6 +205,8 @@ fn stable(solver: &Solver, (from, to): (f64, f64), eigenvalues: &[Complex]) -> R
         Method::Heun => "heun",
         Method::Rk4 => "rk4",
         Method::Dopri5 => "dopri5",
+        Method::Dop853 => "dop853",
+        Method::Rodas4 => "rodas4",
     };
     Err(Fault::Unstable {
         t: from,

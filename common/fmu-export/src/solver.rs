@@ -67,6 +67,8 @@ impl SolverParameters {
             SolverMethod::Heun => Method::Heun,
             SolverMethod::Rk4 => Method::Rk4,
             SolverMethod::Dopri5 => Method::Dopri5,
+            SolverMethod::Dop853 => Method::Dop853,
+            SolverMethod::Rodas4 => Method::Rodas4,
             other => return Err(Fault::MethodNotOffered { method: other as i64 }),
         };
         let Self { step, rtol, atol, .. } = *self;

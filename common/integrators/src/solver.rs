@@ -1,11 +1,15 @@
 //! The solver: settings and the little that a call leaves for the next one.
 
 use crate::adaptive::adaptive;
+use crate::dop853::Dop853;
 use crate::dopri5::DOPRI5;
 use crate::events::{Indicators, Monitor, Reached};
 use crate::fixed::fixed;
 use crate::heun::HEUN;
+use crate::norm::Norm;
+use crate::one_step::{Call, OneStep};
 use crate::rk4::RK4;
+use crate::rodas4::{self, Rodas4};
 use crate::run::{Run, Show, Unwatched, Watch};
 use crate::{Dense, Method, Ode, Settings, SettingsError, Statistics, StepError};
 
@@ -146,20 +150,63 @@ impl Solver {
         if t >= t_end {
             return Ok(t);
         }
-        let mut run = Run {
-            t,
-            x: *x,
+        let mut call = Called {
+            settings: self.settings,
+            memory: self.memory,
+            ode,
+            run: Run { t, x: *x },
             statistics: *statistics,
+            t_end,
+            watch,
         };
-        let mut memory = self.memory;
         match self.settings.method {
-            Method::Heun => fixed(&HEUN, &self.settings, ode, &mut run, t_end, watch)?,
-            Method::Rk4 => fixed(&RK4, &self.settings, ode, &mut run, t_end, watch)?,
-            Method::Dopri5 => adaptive(&DOPRI5, &self.settings, &mut memory, ode, &mut run, t_end, watch)?,
+            Method::Heun => call.with(&HEUN, &mut ())?,
+            Method::Rk4 => call.with(&RK4, &mut ())?,
+            Method::Dopri5 => call.with(&DOPRI5, &mut ())?,
+            Method::Dop853 => call.with(&Dop853, &mut ())?,
+            Method::Rodas4 => call.with(&Rodas4, &mut rodas4::Work::default())?,
         }
-        *x = run.x;
-        *statistics = run.statistics;
-        self.memory = memory;
-        Ok(run.t)
+        *x = call.run.x;
+        *statistics = call.statistics;
+        self.memory = call.memory;
+        Ok(call.run.t)
+    }
+}
+
+/// Working copies of a call.
+struct Called<'a, const N: usize, O, W> {
+    settings: Settings,
+    memory: Memory,
+    ode: &'a O,
+    run: Run<N>,
+    statistics: Statistics,
+    t_end: f64,
+    watch: &'a mut W,
+}
+
+impl<const N: usize, O: Ode<N>, W: Watch<N>> Called<'_, N, O, W> {
+    /// Carries out the call with one method.
+    #[inline]
+    fn with<M: OneStep<N>>(&mut self, method: &M, work: &mut M::Work) -> Result<(), StepError<O::Error>> {
+        let Self {
+            settings,
+            run,
+            t_end,
+            watch,
+            ..
+        } = self;
+        let mut call = Call {
+            ode: self.ode,
+            norm: Norm::new(self.ode, settings, method.tolerance(settings.rtol)),
+            statistics: self.statistics,
+            work,
+        };
+        if settings.method.is_adaptive() {
+            adaptive(method, &mut self.memory, &mut call, run, *t_end, *watch)?;
+        } else {
+            fixed(method, settings, &mut call, run, *t_end, *watch)?;
+        }
+        self.statistics = call.statistics;
+        Ok(())
     }
 }

@@ -62,6 +62,8 @@ where
             steps: 3,
             rejected: 2,
             rhs_evaluations: 1,
+            jacobians: 4,
+            decompositions: 5,
         },
         *solver,
     );

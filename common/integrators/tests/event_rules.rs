@@ -203,6 +203,9 @@ fn indicators_do_not_disturb_the_run() {
             Ok(Reached::End)
         );
         assert_eq!(other.advance(&orbit, 0.0, 7.0, &mut y, &mut r), Ok(()));
+        if method == Method::Dop853 {
+            r.rhs_evaluations += 3 * r.steps + 1; // its continuous extension, and the slope at the last state
+        }
         assert_eq!((x.map(f64::to_bits), s, one), (y.map(f64::to_bits), r, other));
     }
 }
