@@ -207,6 +207,8 @@ fn stable(solver: &Solver, (from, to): (f64, f64), eigenvalues: &[Complex]) -> R
         Method::Dopri5 => "dopri5",
         Method::Dop853 => "dop853",
         Method::Rodas4 => "rodas4",
+        Method::Radau5 => "radau5",
+        Method::Exact => "exact",
     };
     Err(Fault::Unstable {
         t: from,

@@ -33,6 +33,10 @@ impl<const N: usize> Norm<N> {
         }
     }
 
+    pub(crate) fn rtol(&self) -> f64 {
+        self.rtol
+    }
+
     #[inline]
     fn scaled(&self, value: f64, i: usize, x: f64) -> f64 {
         if self.nominal[i].is_finite() {
@@ -48,6 +52,19 @@ impl<const N: usize> Norm<N> {
         let sum: f64 = (0..N)
             .map(|i| self.scaled(values[i], i, x[i].abs().max(x_new[i].abs())).powi(2))
             .sum();
+        (sum / self.counted).sqrt()
+    }
+
+    /// `1 / scale_i` at `x`, 0 for what does not count.
+    #[inline]
+    pub(crate) fn weights(&self, x: &[f64; N]) -> [f64; N] {
+        std::array::from_fn(|i| self.scaled(1.0, i, x[i].abs()))
+    }
+
+    /// Size of `values` under given weights.
+    #[inline]
+    pub(crate) fn weighted(&self, values: &[f64; N], weights: &[f64; N]) -> f64 {
+        let sum: f64 = values.iter().zip(weights).map(|(v, w)| (v * w).powi(2)).sum();
         (sum / self.counted).sqrt()
     }
 

@@ -55,6 +55,14 @@ pub(crate) struct Estimate<const N: usize> {
     pub(crate) parts: [f64; N],
 }
 
+impl<const N: usize> Estimate<N> {
+    /// Of a method without an estimate.
+    pub(crate) const NONE: Self = Self {
+        size: 0.0,
+        parts: [0.0; N],
+    };
+}
+
 /// A method that needs no past: one step from one state.
 ///
 /// What it keeps in its `Work` makes later steps cheaper, never possible.

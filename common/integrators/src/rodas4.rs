@@ -6,7 +6,7 @@
 //! x_new = x + sum_j a_6j u_j + u_6,     error = u_6
 //! x(theta) = (1 - theta) x + theta (x_new + (1 - theta) (sum_j h_1j u_j + theta sum_j h_2j u_j))
 //! ```
-//! Source: Hairer & Wanner II, section IV.7 and table 7.? of the code RODAS (method 1, `gamma = 1/4`).
+//! Source: Hairer & Wanner II, section IV.7; coefficients of their code RODAS (method 1, `gamma = 1/4`).
 
 use crate::lu::Lu;
 use crate::one_step::{Call, Estimate, OneStep, Start};

@@ -4,10 +4,12 @@ use crate::adaptive::adaptive;
 use crate::dop853::Dop853;
 use crate::dopri5::DOPRI5;
 use crate::events::{Indicators, Monitor, Reached};
+use crate::exact::{Exact, Transition};
 use crate::fixed::fixed;
 use crate::heun::HEUN;
 use crate::norm::Norm;
 use crate::one_step::{Call, OneStep};
+use crate::radau5::{self, Radau5};
 use crate::rk4::RK4;
 use crate::rodas4::{self, Rodas4};
 use crate::run::{Run, Show, Unwatched, Watch};
@@ -90,7 +92,24 @@ impl Solver {
         x: &mut [f64; N],
         statistics: &mut Statistics,
     ) -> Result<(), StepError<O::Error>> {
-        self.run(ode, [t, t_end], x, statistics, &mut Unwatched)
+        self.run(ode, [t, t_end], x, statistics, &mut Unwatched, None)
+            .map(|_| ())
+    }
+
+    /// As [`advance`](Self::advance), and the method `exact` keeps its matrices in `cache` for the next call.
+    ///
+    /// # Errors
+    /// As [`advance`](Self::advance); the cache then may have changed and still holds.
+    pub fn advance_cached<const N: usize, O: Ode<N>>(
+        &mut self,
+        ode: &O,
+        cache: &mut Transition<N>,
+        t: f64,
+        t_end: f64,
+        x: &mut [f64; N],
+        statistics: &mut Statistics,
+    ) -> Result<(), StepError<O::Error>> {
+        self.run(ode, [t, t_end], x, statistics, &mut Unwatched, Some(cache))
             .map(|_| ())
     }
 
@@ -107,7 +126,7 @@ impl Solver {
         statistics: &mut Statistics,
         each: impl FnMut(&Dense<N>),
     ) -> Result<(), StepError<O::Error>> {
-        self.run(ode, [t, t_end], x, statistics, &mut Show(each))
+        self.run(ode, [t, t_end], x, statistics, &mut Show(each), None)
             .map(|_| ())
     }
 
@@ -128,7 +147,7 @@ impl Solver {
         statistics: &mut Statistics,
     ) -> Result<Reached<M>, StepError<O::Error>> {
         let mut monitor = Monitor::new(events);
-        let t = self.run(ode, [t, t_end], x, statistics, &mut monitor)?;
+        let t = self.run(ode, [t, t_end], x, statistics, &mut monitor, None)?;
         Ok(monitor
             .which
             .map_or(Reached::End, |which| Reached::Event { t, which }))
@@ -143,6 +162,7 @@ impl Solver {
         x: &mut [f64; N],
         statistics: &mut Statistics,
         watch: &mut W,
+        cache: Option<&mut Transition<N>>,
     ) -> Result<f64, StepError<O::Error>> {
         if !(t.is_finite() && t_end.is_finite() && t <= t_end) {
             return Err(StepError::Interval { t, t_end });
@@ -165,6 +185,12 @@ impl Solver {
             Method::Dopri5 => call.with(&DOPRI5, &mut ())?,
             Method::Dop853 => call.with(&Dop853, &mut ())?,
             Method::Rodas4 => call.with(&Rodas4, &mut rodas4::Work::default())?,
+            Method::Radau5 => call.with(&Radau5, &mut radau5::Work::default())?,
+            Method::Exact if !ode.linear() => return Err(StepError::NotLinear { t }),
+            Method::Exact => match cache {
+                Some(cache) => call.with(&Exact, cache)?,
+                None => call.with(&Exact, &mut Transition::default())?,
+            },
         }
         *x = call.run.x;
         *statistics = call.statistics;

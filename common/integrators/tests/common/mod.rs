@@ -2,9 +2,20 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 
 pub(crate) mod events;
+pub(crate) mod stiff;
 
 use integrators::{Jacobian, Memory, Method, Ode, Settings, Solver, Statistics};
 use std::convert::Infallible;
+
+/// Methods for any system.
+pub(crate) const GENERAL: [Method; 6] = [
+    Method::Heun,
+    Method::Rk4,
+    Method::Dopri5,
+    Method::Dop853,
+    Method::Rodas4,
+    Method::Radau5,
+];
 
 /// Methods with a bounded stability region.
 pub(crate) const EXPLICIT: [Method; 4] = [Method::Heun, Method::Rk4, Method::Dopri5, Method::Dop853];
