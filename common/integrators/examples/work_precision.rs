@@ -89,8 +89,8 @@ where
 {
     fn adaptive(&self, methods: &[Method]) {
         for &method in methods {
-            for digits in 3..=10 {
-                let rtol = 0.1_f64.powi(digits);
+            for half in 6..=20_i32 {
+                let rtol = 10.0_f64.powf(-0.5 * f64::from(half));
                 self.line(&format!("{method:?}").to_lowercase(), (method, rtol, 1.0), None);
             }
         }
@@ -162,7 +162,7 @@ where
             "{},{name},{},{},{error:.3e},{:.3},{},{},{},{},{}",
             self.name,
             if adaptive {
-                format!("{rtol:.0e}")
+                format!("{rtol:.1e}")
             } else {
                 String::new()
             },

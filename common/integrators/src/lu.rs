@@ -29,67 +29,76 @@ impl Field for Complex {
     }
 }
 
-/// `P A = L U`
+/// `P A = L U`, kept by columns: the inner loops then run along memory and carry no sum.
 #[derive(Clone, Copy)]
 pub(crate) struct Lu<T, const N: usize> {
-    /// `L` below the diagonal, `U` above it, and the inverse pivots on it.
-    factors: [[T; N]; N],
+    /// Columns: `U` above the diagonal, the inverse pivot on it, `L` below.
+    columns: [[T; N]; N],
     /// Row of `A` that comes i-th.
     order: [usize; N],
 }
 
+/// `y -= factor x` from index `from` on.
+#[inline]
+fn subtract<T: Field, const N: usize>(y: &mut [T; N], factor: T, x: &[T; N], from: usize) {
+    for (y, x) in y[from..].iter_mut().zip(&x[from..]) {
+        *y = *y - factor * *x;
+    }
+}
+
 impl<T: Field, const N: usize> Lu<T, N> {
-    /// `None` for a matrix that is singular or not finite.
+    /// Of the matrix with the given rows; `None` if it is singular or not finite.
     #[inline]
-    pub(crate) fn new(mut a: [[T; N]; N]) -> Option<Self> {
+    pub(crate) fn new(rows: &[[T; N]; N]) -> Option<Self> {
+        let mut columns: [[T; N]; N] = std::array::from_fn(|j| std::array::from_fn(|i| rows[i][j]));
         let mut order: [usize; N] = std::array::from_fn(|i| i);
         for k in 0..N {
-            let (mut pivot, mut largest) = (k, a[k][k].size());
-            for (i, row) in a.iter().enumerate().skip(k + 1) {
-                if row[k].size() > largest {
-                    (pivot, largest) = (i, row[k].size());
+            let (mut pivot, mut largest) = (k, columns[k][k].size());
+            for i in k + 1..N {
+                let size = columns[k][i].size();
+                if size > largest {
+                    (pivot, largest) = (i, size);
                 }
             }
             if !(largest > 0.0 && largest.is_finite()) {
                 return None;
             }
             if pivot != k {
-                a.swap(k, pivot);
+                for column in &mut columns {
+                    column.swap(k, pivot);
+                }
                 order.swap(k, pivot);
             }
-            let (above, below) = a.split_at_mut(k + 1);
-            let top = &mut above[k];
-            let inverse = T::ONE / top[k];
-            top[k] = inverse;
-            for row in below {
-                let factor = row[k] * inverse;
-                row[k] = factor;
-                for j in k + 1..N {
-                    row[j] = row[j] - factor * top[j];
-                }
+            let (left, right) = columns.split_at_mut(k + 1);
+            let lower = &mut left[k];
+            let inverse = T::ONE / lower[k];
+            lower[k] = inverse;
+            for i in k + 1..N {
+                lower[i] = lower[i] * inverse;
+            }
+            for column in right {
+                let factor = column[k];
+                subtract(column, factor, lower, k + 1);
             }
         }
-        Some(Self { factors: a, order })
+        Some(Self { columns, order })
     }
 
     /// `A^(-1) b`
     #[inline]
     pub(crate) fn solve(&self, b: &[T; N]) -> [T; N] {
-        let a = &self.factors;
         let mut x = self.order.map(|i| b[i]);
-        for i in 1..N {
-            let mut sum = x[i];
-            for j in 0..i {
-                sum = sum - a[i][j] * x[j];
-            }
-            x[i] = sum;
+        for k in 0..N {
+            let found = x[k];
+            subtract(&mut x, found, &self.columns[k], k + 1);
         }
-        for i in (0..N).rev() {
-            let mut sum = x[i];
-            for j in i + 1..N {
-                sum = sum - a[i][j] * x[j];
+        for k in (0..N).rev() {
+            let column = &self.columns[k];
+            let found = x[k] * column[k];
+            x[k] = found;
+            for i in 0..k {
+                x[i] = x[i] - found * column[i];
             }
-            x[i] = sum * a[i][i];
         }
         x
     }
@@ -106,7 +115,7 @@ mod tests {
         let a: [[f64; 6]; 6] =
             std::array::from_fn(|i| std::array::from_fn(|j| 1.0 / (index(i) + index(j) + 1.0)));
         let b = a.map(|row| row.iter().sum());
-        let x = Lu::new(a).expect("regular").solve(&b);
+        let x = Lu::new(&a).expect("regular").solve(&b);
         assert!(x.iter().all(|x| (x - 1.0).abs() < 1.5e7 * f64::EPSILON), "{x:?}");
     }
 
@@ -115,7 +124,7 @@ mod tests {
     fn solves_a_complex_system_with_a_zero_pivot() {
         let c = Complex::new;
         let a = [[c(0.0, 0.0), c(0.0, 1.0)], [c(1.0, 1.0), c(2.0, 0.0)]];
-        let x = Lu::new(a).expect("regular").solve(&[c(3.0, 0.0), c(0.0, 5.0)]);
+        let x = Lu::new(&a).expect("regular").solve(&[c(3.0, 0.0), c(0.0, 5.0)]);
         // i y = 3; (1 + i) x + 2 y = 5 i
         let y = c(0.0, -3.0);
         let x_exact = c(0.0, 11.0) / c(1.0, 1.0);
@@ -127,8 +136,8 @@ mod tests {
 
     #[test]
     fn singular_and_infinite_matrices_are_refused() {
-        assert!(Lu::new([[1.0, 2.0], [2.0, 4.0]]).is_none());
-        assert!(Lu::new([[f64::NAN, 2.0], [2.0, 4.0]]).is_none());
-        assert!(Lu::new([[1.0, 2.0], [f64::INFINITY, 4.0]]).is_none());
+        assert!(Lu::new(&[[1.0, 2.0], [2.0, 4.0]]).is_none());
+        assert!(Lu::new(&[[f64::NAN, 2.0], [2.0, 4.0]]).is_none());
+        assert!(Lu::new(&[[1.0, 2.0], [f64::INFINITY, 4.0]]).is_none());
     }
 }

@@ -157,7 +157,7 @@ pub(crate) fn integral_of_exponential<const N: usize>(a: &Matrix<N>, h: f64) -> 
     let w = even([b[13], b[11], b[9]], [b[7], b[5], b[3], b[1]]);
     let v = even([b[12], b[10], b[8]], [b[6], b[4], b[2], b[0]]);
     let u = product(&z, &w);
-    let lu = Lu::new(combine(&[(1.0, &v), (-1.0, &u)], 0.0))?;
+    let lu = Lu::new(&combine(&[(1.0, &v), (-1.0, &u)], 0.0))?;
     // columns of phi_1, as rows; it commutes with z, so products may be formed on either side
     let mut psi = [[0.0; N]; N];
     for j in 0..N {

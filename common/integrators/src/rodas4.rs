@@ -222,7 +222,7 @@ impl<const N: usize> OneStep<N> for Rodas4 {
             row[i] += 1.0 / (GAMMA * h);
         }
         call.statistics.decompositions += 1;
-        let lu = Lu::new(matrix).ok_or(StepError::NoSolution { t: *t, h })?;
+        let lu = Lu::new(&matrix).ok_or(StepError::NoSolution { t: *t, h })?;
         let mut u = [[0.0; N]; STAGES];
         let mut stage = *x;
         for i in 0..STAGES {

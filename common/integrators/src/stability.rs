@@ -40,13 +40,13 @@ pub(crate) fn implicit<const S: usize>(a: &[[f64; S]; S], b: &[f64; S], z: Compl
         return Complex::default();
     }
     let one = Complex::new(1.0, 0.0);
-    let equations = std::array::from_fn(|i| {
+    let equations: [[Complex; S]; S] = std::array::from_fn(|i| {
         std::array::from_fn(|j| {
             let unit = if i == j { one } else { Complex::default() };
             unit - a[i][j] * z
         })
     });
-    let Some(lu) = Lu::new(equations) else {
+    let Some(lu) = Lu::new(&equations) else {
         return Complex::new(f64::INFINITY, 0.0); // a pole, or not a number
     };
     let k = lu.solve(&[one; S]);

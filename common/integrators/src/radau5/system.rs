@@ -106,8 +106,8 @@ impl<const N: usize> Matrices<N> {
         }
         Some(Self {
             h,
-            real: Lu::new(real)?,
-            complex: Lu::new(complex)?,
+            real: Lu::new(&real)?,
+            complex: Lu::new(&complex)?,
         })
     }
 
