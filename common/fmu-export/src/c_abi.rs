@@ -13,9 +13,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use model::{Kind, Model};
 
-use crate::instance::{Instance, State};
-use crate::phase::{self, Rule};
-use crate::{Fault, Status};
+use crate::phase::{self, Interface, Rule};
+use crate::{Fault, Instance, State, Status};
 
 /// `fmi3LogMessageCallback`
 pub type LogMessage = unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char);
@@ -77,7 +76,7 @@ struct Component<M: Model> {
 /// Run `body` on the instance: null check, phase rule, panic barrier, message, status.
 ///
 /// # Safety
-/// `instance` is null or came from [`fmi3InstantiateCoSimulation`] and was not freed.
+/// `instance` is null or came from [`instantiate`] and was not freed.
 unsafe fn call<M: Model>(
     instance: *mut c_void,
     rule: &Rule,
@@ -156,6 +155,40 @@ pub fn fmi3GetVersion() -> *const c_char {
     c"3.0".as_ptr()
 }
 
+/// A new instance, or null with a message.
+///
+/// # Safety
+/// The token is null or a null-terminated string; callback and environment as FMI defines them.
+unsafe fn instantiate<M: Model>(
+    function: &str,
+    interface: Interface,
+    token: *const c_char,
+    environment: *mut c_void,
+    log_message: Option<LogMessage>,
+) -> *mut c_void {
+    let log = Log { environment, callback: log_message, categories: None };
+    let refuse = |message: &str| {
+        log.send(Status::Error, ERROR_CATEGORY, &format!("{function}: {message}"));
+        std::ptr::null_mut()
+    };
+    let created = catch_unwind(|| {
+        // SAFETY: by the contract of this function.
+        let (given, expected) = (unsafe { text(token) }, Instance::<M>::token());
+        if given != expected {
+            return Err(format!("instantiationToken is \"{given}\"; this binary belongs to \"{expected}\""));
+        }
+        if interface == Interface::ModelExchange && !M::MODEL_EXCHANGE {
+            return Err("Model Exchange is not supported: this is a Co-Simulation FMU".into());
+        }
+        Ok(Instance::<M>::with_interface(interface))
+    });
+    match created {
+        Ok(Ok(instance)) => Box::into_raw(Box::new(Component { instance, log })).cast(),
+        Ok(Err(message)) => refuse(&message),
+        Err(_) => refuse("internal error"),
+    }
+}
+
 #[doc(hidden)]
 pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
     token: *const c_char,
@@ -163,26 +196,27 @@ pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
     environment: *mut c_void,
     log_message: Option<LogMessage>,
 ) -> *mut c_void {
-    let log = Log { environment, callback: log_message, categories: None };
-    let refuse = |message: &str| {
-        log.send(Status::Error, ERROR_CATEGORY, &format!("fmi3InstantiateCoSimulation: {message}"));
-        std::ptr::null_mut()
-    };
-    let created = catch_unwind(|| {
-        // SAFETY: FMI: the token is a null-terminated string.
-        let (given, expected) = (unsafe { text(token) }, Instance::<M>::token());
-        if given != expected {
-            return Err(format!("instantiationToken is \"{given}\"; this binary belongs to \"{expected}\""));
-        }
-        if event_mode_used != 0 {
-            return Err("eventModeUsed = true is not supported (hasEventMode is not declared)".into());
-        }
-        Ok(Instance::<M>::new())
-    });
-    match created {
-        Ok(Ok(instance)) => Box::into_raw(Box::new(Component { instance, log })).cast(),
-        Ok(Err(message)) => refuse(&message),
-        Err(_) => refuse("internal error"),
+    let interface =
+        if event_mode_used == 0 { Interface::CoSimulation } else { Interface::CoSimulationWithEvents };
+    // SAFETY: the arguments as the host passes them.
+    unsafe { instantiate::<M>("fmi3InstantiateCoSimulation", interface, token, environment, log_message) }
+}
+
+#[doc(hidden)]
+pub unsafe fn fmi3InstantiateModelExchange<M: Model>(
+    token: *const c_char,
+    environment: *mut c_void,
+    log_message: Option<LogMessage>,
+) -> *mut c_void {
+    // SAFETY: the arguments as the host passes them.
+    unsafe {
+        instantiate::<M>(
+            "fmi3InstantiateModelExchange",
+            Interface::ModelExchange,
+            token,
+            environment,
+            log_message,
+        )
     }
 }
 
@@ -314,11 +348,155 @@ pub unsafe fn fmi3DoStep<M: Model>(
             }
             let last = &mut array_mut("lastSuccessfulTime", last_successful_time, 1)?[0];
             *last = c.instance.time();
-            c.instance.do_step(t, step)?;
+            let event = c.instance.do_step(t, step)?;
             *last = c.instance.time();
+            if event {
+                array_mut("eventHandlingNeeded", event_handling_needed, 1)?[0] = 1;
+            }
             Ok(())
         })
     }
+}
+
+/// Functions without arguments.
+macro_rules! transitions {
+    ($($name:ident $rule:ident $method:ident;)*) => {
+        $(
+            #[doc(hidden)]
+            pub unsafe fn $name<M: Model>(instance: *mut c_void) -> Status {
+                // SAFETY: FMI instance, checked for null by `call`.
+                unsafe { call::<M>(instance, &phase::$rule, |c| c.instance.$method()) }
+            }
+        )*
+    };
+}
+transitions! {
+    fmi3EnterEventMode ENTER_EVENT_MODE enter_event_mode;
+    fmi3EnterStepMode ENTER_STEP_MODE enter_step_mode;
+    fmi3EnterContinuousTimeMode ENTER_CONTINUOUS_TIME_MODE enter_continuous_time_mode;
+}
+
+#[doc(hidden)]
+pub unsafe fn fmi3UpdateDiscreteStates<M: Model>(
+    instance: *mut c_void,
+    need_update: *mut Bool,
+    terminate: *mut Bool,
+    nominals_changed: *mut Bool,
+    values_changed: *mut Bool,
+    next_event_defined: *mut Bool,
+    next_event: *mut f64,
+) -> Status {
+    // SAFETY: FMI pointers, checked for null by `call` and `array_mut`.
+    unsafe {
+        call::<M>(instance, &phase::UPDATE_DISCRETE_STATES, |c| {
+            let flags = [
+                ("discreteStatesNeedUpdate", need_update),
+                ("terminateSimulation", terminate),
+                ("nominalsOfContinuousStatesChanged", nominals_changed),
+                ("valuesOfContinuousStatesChanged", values_changed),
+                ("nextEventTimeDefined", next_event_defined),
+            ];
+            for (argument, flag) in flags {
+                array_mut(argument, flag, 1)?[0] = 0;
+            }
+            let next = &mut array_mut("nextEventTime", next_event, 1)?[0];
+            let event = c.instance.update_discrete_states()?;
+            let set = |(argument, flag), value: bool| -> Result<(), Fault> {
+                array_mut(argument, flag, 1)?[0] = u8::from(value);
+                Ok(())
+            };
+            set(flags[0], event.again)?;
+            set(flags[3], event.states_changed)?;
+            set(flags[4], event.next.is_some())?;
+            if let Some(t) = event.next {
+                *next = t;
+            }
+            Ok(())
+        })
+    }
+}
+
+#[doc(hidden)]
+pub unsafe fn fmi3CompletedIntegratorStep<M: Model>(
+    instance: *mut c_void,
+    _no_set_state_prior: Bool,
+    enter_event_mode: *mut Bool,
+    terminate: *mut Bool,
+) -> Status {
+    // SAFETY: FMI pointers, checked for null by `call` and `array_mut`.
+    unsafe {
+        call::<M>(instance, &phase::COMPLETED_INTEGRATOR_STEP, |c| {
+            array_mut("terminateSimulation", terminate, 1)?[0] = 0;
+            let event = &mut array_mut("enterEventMode", enter_event_mode, 1)?[0];
+            *event = u8::from(c.instance.completed_integrator_step()?);
+            Ok(())
+        })
+    }
+}
+
+#[doc(hidden)]
+pub unsafe fn fmi3SetTime<M: Model>(instance: *mut c_void, t: f64) -> Status {
+    // SAFETY: FMI instance, checked for null by `call`.
+    unsafe { call::<M>(instance, &phase::SET_TIME, |c| c.instance.set_time(t)) }
+}
+
+#[doc(hidden)]
+pub unsafe fn fmi3SetContinuousStates<M: Model>(
+    instance: *mut c_void,
+    states: *const f64,
+    n: usize,
+) -> Status {
+    // SAFETY: FMI pointers, checked for null.
+    unsafe {
+        call::<M>(instance, &phase::SET_CONTINUOUS_STATES, |c| {
+            c.instance.set_continuous_states(array("continuousStates", states, n)?)
+        })
+    }
+}
+
+/// Functions that fill one list of numbers.
+macro_rules! lists {
+    ($($name:ident $rule:ident $method:ident;)*) => {
+        $(
+            #[doc(hidden)]
+            pub unsafe fn $name<M: Model>(instance: *mut c_void, values: *mut f64, n: usize) -> Status {
+                // SAFETY: FMI pointers, checked for null.
+                unsafe {
+                    call::<M>(instance, &phase::$rule, |c| {
+                        c.instance.$method(array_mut("values", values, n)?)
+                    })
+                }
+            }
+        )*
+    };
+}
+lists! {
+    fmi3GetContinuousStates GET_CONTINUOUS_STATES get_continuous_states;
+    fmi3GetContinuousStateDerivatives GET_DERIVATIVES get_derivatives;
+    fmi3GetNominalsOfContinuousStates GET_NOMINALS get_nominals;
+    fmi3GetEventIndicators GET_INDICATORS get_indicators;
+}
+
+/// Functions that give one count.
+macro_rules! counts {
+    ($($name:ident $rule:ident $method:ident;)*) => {
+        $(
+            #[doc(hidden)]
+            pub unsafe fn $name<M: Model>(instance: *mut c_void, n: *mut usize) -> Status {
+                // SAFETY: FMI pointers, checked for null.
+                unsafe {
+                    call::<M>(instance, &phase::$rule, |c| {
+                        array_mut("count", n, 1)?[0] = c.instance.$method();
+                        Ok(())
+                    })
+                }
+            }
+        )*
+    };
+}
+counts! {
+    fmi3GetNumberOfContinuousStates COUNT_STATES state_count;
+    fmi3GetNumberOfEventIndicators COUNT_INDICATORS indicator_count;
 }
 
 #[doc(hidden)]
@@ -467,8 +645,7 @@ pub unsafe fn fmi3SetFMUState<M: Model>(instance: *mut c_void, state: *mut c_voi
     unsafe {
         call::<M>(instance, &phase::SET_FMU_STATE, |c| {
             let saved = state.cast::<State<M>>().as_ref().ok_or(Fault::Null { argument: "FMUState" })?;
-            c.instance.restore(saved);
-            Ok(())
+            c.instance.restore(saved)
         })
     }
 }
@@ -572,6 +749,21 @@ macro_rules! export {
             fmi3ExitInitializationMode();
             fmi3Terminate();
             fmi3Reset();
+            // events
+            fmi3EnterEventMode();
+            fmi3UpdateDiscreteStates(need_update: *mut u8, terminate: *mut u8, nominals_changed: *mut u8, values_changed: *mut u8, next_event_defined: *mut u8, next_event: *mut f64);
+            fmi3EnterStepMode();
+            // Model Exchange
+            fmi3EnterContinuousTimeMode();
+            fmi3CompletedIntegratorStep(no_set_state_prior: u8, enter_event_mode: *mut u8, terminate: *mut u8);
+            fmi3SetTime(time: f64);
+            fmi3SetContinuousStates(states: *const f64, n: usize);
+            fmi3GetContinuousStates(states: *mut f64, n: usize);
+            fmi3GetContinuousStateDerivatives(derivatives: *mut f64, n: usize);
+            fmi3GetNominalsOfContinuousStates(nominals: *mut f64, n: usize);
+            fmi3GetEventIndicators(indicators: *mut f64, n: usize);
+            fmi3GetNumberOfContinuousStates(n: *mut usize);
+            fmi3GetNumberOfEventIndicators(n: *mut usize);
             // values
             fmi3GetFloat64(vr: *const u32, n: usize, values: *mut f64, n_values: usize);
             fmi3GetInt32(vr: *const u32, n: usize, values: *mut i32, n_values: usize);
@@ -615,10 +807,6 @@ macro_rules! export {
             fmi3SetShiftFraction(vr: *const u32, n: usize, counters: *const u64, resolutions: *const u64);
             fmi3EvaluateDiscreteStates();
             fmi3ActivateModelPartition(clock: u32, time: f64);
-            "Event Mode is not declared":
-            fmi3EnterEventMode();
-            fmi3EnterStepMode();
-            fmi3UpdateDiscreteStates(need_update: *mut u8, terminate: *mut u8, nominals_changed: *mut u8, values_changed: *mut u8, next_event_defined: *mut u8, next_event: *mut f64);
             "serialised state is not declared":
             fmi3SerializedFMUStateSize(state: *mut c_void, size: *mut usize);
             fmi3SerializeFMUState(state: *mut c_void, data: *mut u8, size: usize);
@@ -630,17 +818,6 @@ macro_rules! export {
             fmi3GetAdjointDerivative(unknowns: *const u32, n_unknowns: usize, knowns: *const u32, n_knowns: usize, seed: *const f64, n_seed: usize, sensitivity: *mut f64, n_sensitivity: usize);
             "output derivatives are not declared":
             fmi3GetOutputDerivatives(vr: *const u32, n: usize, orders: *const i32, values: *mut f64, n_values: usize);
-            "this is a Co-Simulation FMU":
-            fmi3EnterContinuousTimeMode();
-            fmi3CompletedIntegratorStep(no_set_state: u8, enter_event_mode: *mut u8, terminate: *mut u8);
-            fmi3SetTime(time: f64);
-            fmi3SetContinuousStates(states: *const f64, n: usize);
-            fmi3GetContinuousStateDerivatives(derivatives: *mut f64, n: usize);
-            fmi3GetEventIndicators(indicators: *mut f64, n: usize);
-            fmi3GetContinuousStates(states: *mut f64, n: usize);
-            fmi3GetNominalsOfContinuousStates(nominals: *mut f64, n: usize);
-            fmi3GetNumberOfEventIndicators(n: *mut usize);
-            fmi3GetNumberOfContinuousStates(n: *mut usize);
         }
 
         #[allow(unsafe_code, non_snake_case, missing_docs, unused_variables, clippy::too_many_arguments, clippy::missing_safety_doc, reason = "C interface of FMI 3.0")]
@@ -667,7 +844,7 @@ macro_rules! export {
                 environment: *mut c_void, log_message: Option<c_abi::LogMessage>,
             ) -> *mut c_void {
                 // SAFETY: the arguments as the host passes them.
-                unsafe { c_abi::refuse_instance("fmi3InstantiateModelExchange", "this is a Co-Simulation FMU", environment, log_message) }
+                unsafe { c_abi::fmi3InstantiateModelExchange::<$model>(token, environment, log_message) }
             }
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi3InstantiateScheduledExecution(
@@ -676,7 +853,7 @@ macro_rules! export {
                 lock_preemption: *const c_void, unlock_preemption: *const c_void,
             ) -> *mut c_void {
                 // SAFETY: the arguments as the host passes them.
-                unsafe { c_abi::refuse_instance("fmi3InstantiateScheduledExecution", "this is a Co-Simulation FMU", environment, log_message) }
+                unsafe { c_abi::refuse_instance("fmi3InstantiateScheduledExecution", "there are no clocks", environment, log_message) }
             }
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi3FreeInstance(instance: *mut c_void) {

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeSet;
 use std::io;
+use std::ops::Range;
 
 use model::{Causality, EnumType, Initial, Kind, Model, Variability};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
 
 use crate::c_abi::LOG_CATEGORIES;
-use crate::table::{Table, Variable, kind_name};
+use crate::table::{Layout, Part, Table, Variable, kind_name};
 use crate::unit::BaseUnit;
 
 type Xml = Writer<Vec<u8>>;
@@ -19,7 +20,7 @@ fn number(value: f64) -> String {
     text.strip_suffix(".0").map_or(text.clone(), String::from)
 }
 
-/// The model description of `M` for FMI 3.0 Co-Simulation.
+/// The model description of `M` for FMI 3.0.
 ///
 /// # Errors
 /// A unit that is not known; otherwise none (writing goes to memory).
@@ -39,12 +40,22 @@ pub fn model_description<M: Model>() -> io::Result<Vec<u8>> {
             ("variableNamingConvention", "structured"),
         ])
         .write_inner_content(|xml| {
+            let common = [
+                ("modelIdentifier", M::NAME),
+                ("canGetAndSetFMUState", "true"),
+                ("providesDirectionalDerivatives", "true"),
+            ];
+            if M::MODEL_EXCHANGE {
+                xml.create_element("ModelExchange")
+                    .with_attributes(common)
+                    .with_attribute(("needsCompletedIntegratorStep", "true"))
+                    .write_empty()?;
+            }
             xml.create_element("CoSimulation")
+                .with_attributes(common)
                 .with_attributes([
-                    ("modelIdentifier", M::NAME),
-                    ("canGetAndSetFMUState", "true"),
-                    ("providesDirectionalDerivatives", "true"),
                     ("canHandleVariableCommunicationStepSize", "true"),
+                    ("hasEventMode", "true"),
                 ])
                 .write_empty()?;
             units(xml, &table)?;
@@ -67,9 +78,15 @@ pub fn model_description<M: Model>() -> io::Result<Vec<u8>> {
                 ])
                 .write_empty()?;
             xml.create_element("ModelVariables").write_inner_content(|xml| {
-                table.variables.iter().enumerate().try_for_each(|(reference, v)| variable(xml, reference, v))
+                table
+                    .variables
+                    .iter()
+                    .enumerate()
+                    .try_for_each(|(reference, v)| variable(xml, reference, v, table.is_state(reference)))
             })?;
-            xml.create_element("ModelStructure").write_inner_content(|xml| structure(xml, &table))?;
+            let indicators = Layout::<M>::part(Part::Indicators);
+            xml.create_element("ModelStructure")
+                .write_inner_content(|xml| structure(xml, &table, indicators))?;
             Ok(())
         })?;
     xml.write_event(Event::Text(BytesText::new("\n")))?;
@@ -135,7 +152,8 @@ fn types(xml: &mut Xml, table: &Table) -> io::Result<()> {
     Ok(())
 }
 
-fn variable(xml: &mut Xml, reference: usize, Variable { name, entry }: &Variable) -> io::Result<()> {
+fn variable(xml: &mut Xml, reference: usize, variable: &Variable, is_state: bool) -> io::Result<()> {
+    let Variable { name, entry, derivative_of } = variable;
     let reference = reference.to_string();
     let causality = match entry.causality {
         Causality::Parameter => "parameter",
@@ -182,29 +200,43 @@ fn variable(xml: &mut Xml, reference: usize, Variable { name, entry }: &Variable
         };
         attributes.push(("start", start));
     }
+    if let Some(state) = derivative_of {
+        attributes.push(("derivative", state.to_string()));
+    }
+    if is_state {
+        attributes.push(("reinit", "true".into())); // events may move any state
+    }
     let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
     xml.create_element(kind_name(entry.kind)).with_attributes(attributes).write_empty()?;
     Ok(())
 }
 
-/// Outputs with their exact direct dependencies; outputs computed at the start as initial unknowns.
-fn structure(xml: &mut Xml, table: &Table) -> io::Result<()> {
-    let outputs: Vec<_> = (0..table.variables.len())
-        .filter(|i| table.variables[*i].entry.causality == Causality::Output)
-        .collect();
-    for output in &outputs {
-        let inputs: Vec<_> = table.dependencies(*output).iter().map(ToString::to_string).collect();
-        xml.create_element("Output")
-            .with_attributes([
-                ("valueReference", output.to_string().as_str()),
-                ("dependencies", &inputs.join(" ")),
-            ])
-            .write_empty()?;
+/// Outputs and derivatives with their exact direct dependencies; what is computed at the start as
+/// initial unknowns; event indicators.
+fn structure(xml: &mut Xml, table: &Table, indicators: Range<usize>) -> io::Result<()> {
+    let all = || 0..table.variables.len();
+    let of = |i: usize| &table.variables[i];
+    let outputs: Vec<_> = all().filter(|i| of(*i).entry.causality == Causality::Output).collect();
+    let derivatives: Vec<_> = all().filter(|i| of(*i).derivative_of.is_some()).collect();
+    for (element, unknowns) in [("Output", &outputs), ("ContinuousStateDerivative", &derivatives)] {
+        for unknown in unknowns {
+            let knowns: Vec<_> = table.dependencies(*unknown).iter().map(ToString::to_string).collect();
+            xml.create_element(element)
+                .with_attributes([
+                    ("valueReference", unknown.to_string().as_str()),
+                    ("dependencies", &knowns.join(" ")),
+                ])
+                .write_empty()?;
+        }
     }
-    for output in outputs {
-        if table.variables[output].entry.initial != Initial::Exact {
-            xml.create_element("InitialUnknown")
-                .with_attribute(("valueReference", output.to_string().as_str()))
+    let mut initial: Vec<_> = [outputs, table.states.clone(), derivatives].concat();
+    initial.retain(|i| of(*i).entry.initial != Initial::Exact);
+    initial.sort_unstable();
+    initial.dedup();
+    for (element, unknowns) in [("InitialUnknown", initial), ("EventIndicator", indicators.collect())] {
+        for unknown in unknowns {
+            xml.create_element(element)
+                .with_attribute(("valueReference", unknown.to_string().as_str()))
                 .write_empty()?;
         }
     }

@@ -3,7 +3,7 @@
 use integrators::{SettingsError, StepError};
 use model::{EvaluationError, ParameterError};
 
-use crate::SolverMethod;
+use crate::{Interface, SolverMethod};
 
 /// Status of a call, numbered as `fmi3Status`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,6 +120,20 @@ pub enum Fault {
     /// Solver settings.
     #[error(transparent)]
     Settings(#[from] SettingsError),
+    /// A state of the system that is no variable, a mistake in the model.
+    #[error("the state {state} is not declared")]
+    UndeclaredState {
+        /// Its name
+        state: String,
+    },
+    /// The saved state of an instance that is used in another way.
+    #[error("FMUState belongs to an instance for {saved}; this one is for {instance}")]
+    ForeignState {
+        /// How the saved instance is used
+        saved: Interface,
+        /// How this one is used
+        instance: Interface,
+    },
     /// Parameters that do not fit together.
     #[error(transparent)]
     Parameter(#[from] ParameterError),

@@ -1,79 +1,32 @@
 //! An instance of an FMU without its C boundary: values, phases, lazy outputs, steps.
 
 use integrators::{Solver, Statistics};
-use model::{Causality, Entry, Group, Kind, Model, ParameterError, Variables};
+use model::{Causality, Entry, Kind, Model, ParameterError, Variability, Variables};
 use num_dual::Dual64;
 
-use crate::jobs::{Evaluate, Start, Step};
-use crate::phase::{Phase, Rule};
-use crate::table::{FLOAT, Layout, Table, Variable, allowed, changes_in_a_run, kind_name};
-use crate::{Fault, SolverCounters, SolverParameters};
+use crate::inputs::{Channels, Polynomials};
+use crate::jobs::{Evaluate, EventIndicators, Rates, Start};
+use crate::phase::{Interface, Phase, Rule};
+use crate::state::State;
+use crate::table::{ALL_PARTS, FLOAT, Layout, Part, Table, Variable, allowed, changes_in_a_run, kind_name};
+use crate::{Fault, SolverParameters};
 
-/// Relative change of the inner step from which the stability guard looks again.
-const SAME_STEP: f64 = 1e-6;
 /// A host may miss the instance's time by this much (relative to max(1, |t|)).
-const SAME_TIME: f64 = 1e-9;
-/// Every group up to date.
-const ALL_FRESH: u8 = 0x0f;
-
-/// Everything that a run changes; what `GetFMUState` saves.
-#[derive(Debug)]
-pub struct State<M: Model> {
-    phase: Phase,
-    values: Vec<f64>,
-    model: Option<M>,
-    x: Vec<f64>,
-    discrete: M::Discrete,
-    start_time: f64,
-    stop_time: Option<f64>,
-    solver: Option<Solver>,
-    statistics: Statistics,
-    /// Bit per group: the values in the list belong to the present states and inputs
-    fresh: u8,
-    /// Tunable parameters were set and not yet taken over
-    retune: bool,
-    /// Inner step for which the stability guard was passed; 0: look again
-    guarded: f64,
-}
-
-impl<M: Model> Clone for State<M> {
-    fn clone(&self) -> Self {
-        Self { values: self.values.clone(), model: self.model.clone(), x: self.x.clone(), ..*self }
-    }
-    fn clone_from(&mut self, other: &Self) {
-        let (mut values, mut x) = (std::mem::take(&mut self.values), std::mem::take(&mut self.x));
-        values.clone_from(&other.values);
-        x.clone_from(&other.x);
-        *self = Self { values, x, model: other.model.clone(), ..*other };
-    }
-}
-
-impl<M: Model> State<M> {
-    fn new(table: &Table) -> Self {
-        Self {
-            phase: Phase::Instantiated,
-            values: table.start_values(),
-            model: None,
-            x: Vec::new(),
-            discrete: M::Discrete::default(),
-            start_time: 0.0,
-            stop_time: None,
-            solver: None,
-            statistics: Statistics::default(),
-            fresh: 0,
-            retune: false,
-            guarded: 0.0,
-        }
-    }
-}
+pub(crate) const SAME_TIME: f64 = 1e-9;
 
 /// An instance.
 #[derive(Debug)]
 pub struct Instance<M: Model> {
-    table: Table,
-    state: State<M>,
+    pub(crate) table: Table,
+    pub(crate) state: State<M>,
     /// Inputs and outputs in dual numbers, kept so that derivatives allocate nothing
-    duals: Vec<Dual64>,
+    pub(crate) duals: Vec<Dual64>,
+    /// States in dual numbers
+    pub(crate) dual_states: Vec<Dual64>,
+    pub(crate) channels: Channels,
+    /// Working memory of a step: the course of the inputs, and their values inside it
+    pub(crate) polynomials: Polynomials,
+    pub(crate) moving: Vec<f64>,
     warnings: Vec<String>,
 }
 
@@ -84,12 +37,32 @@ impl<M: Model> Default for Instance<M> {
 }
 
 impl<M: Model> Instance<M> {
-    /// A new instance with all start values.
+    /// A new instance for Co-Simulation without Event Mode, with all start values.
     #[must_use]
     pub fn new() -> Self {
+        Self::with_interface(Interface::CoSimulation)
+    }
+
+    /// A new instance with all start values.
+    #[must_use]
+    pub fn with_interface(interface: Interface) -> Self {
         let table = Table::new::<M>();
-        let state = State::new(&table);
-        Self { duals: vec![Dual64::from_re(0.0); table.variables.len()], table, state, warnings: Vec::new() }
+        let state = State::new(&table, interface);
+        let channels = Channels::new(table.variables[Layout::<M>::INPUTS].iter().map(|v| {
+            let e = &v.entry;
+            let continuous = e.variability == Variability::Continuous;
+            (v.name.as_str(), continuous, e.min, e.max, e.nominal)
+        }));
+        Self {
+            duals: vec![Dual64::from_re(0.0); table.variables.len()],
+            dual_states: Vec::new(),
+            polynomials: Polynomials::new(&channels),
+            moving: vec![0.0; channels.count()],
+            channels,
+            table,
+            state,
+            warnings: Vec::new(),
+        }
     }
 
     /// Hash of the variable table.
@@ -109,13 +82,14 @@ impl<M: Model> Instance<M> {
     /// [`Fault::WrongPhase`].
     #[inline]
     pub fn enter(&self, rule: &Rule) -> Result<(), Fault> {
-        if rule.allows(self.state.phase) {
+        let State { interface, phase, .. } = self.state;
+        if rule.allows(interface, phase) {
             return Ok(());
         }
         Err(Fault::WrongPhase {
             function: rule.function,
-            phase: format!("{:?}", self.state.phase),
-            allowed: rule.allowed(),
+            phase: format!("{phase:?} of {interface}"),
+            allowed: rule.allowed(interface),
         })
     }
 
@@ -124,7 +98,8 @@ impl<M: Model> Instance<M> {
         self.state.phase = Phase::Broken;
     }
 
-    fn variable(&self, reference: u32) -> Result<&Variable, Fault> {
+    /// A variable by its value reference.
+    pub(crate) fn variable(&self, reference: u32) -> Result<&Variable, Fault> {
         self.table
             .variables
             .get(reference as usize)
@@ -144,7 +119,7 @@ impl<M: Model> Instance<M> {
                 _ => return Err(self.wrong_type(*reference, "Float64")),
             }
         }
-        self.refresh(needed & ALL_FRESH)?;
+        self.refresh(needed & ALL_PARTS)?;
         for (value, reference) in values.iter_mut().zip(references) {
             *value = self.state.values[*reference as usize];
         }
@@ -194,7 +169,7 @@ impl<M: Model> Instance<M> {
         value: impl Fn(usize) -> f64,
     ) -> Result<(), Fault> {
         for (i, reference) in references.iter().enumerate() {
-            let Variable { name, entry } = self.variable(*reference)?;
+            let Variable { name, entry, .. } = self.variable(*reference)?;
             if !is(entry.kind) {
                 return Err(self.wrong_type(*reference, called));
             }
@@ -213,29 +188,56 @@ impl<M: Model> Instance<M> {
             }
         }
         for (i, reference) in references.iter().enumerate() {
-            self.state.values[*reference as usize] = value(i);
-        }
-        if !references.is_empty() {
-            self.state.fresh = 0;
-            let inputs = Layout::<M>::INPUTS;
-            if !references.iter().all(|r| inputs.contains(&(*r as usize))) {
-                if self.state.phase == Phase::StepMode {
-                    self.state.retune = true;
-                } else {
-                    self.state.model = None; // start values or parameters changed: assemble again
-                }
-            }
+            self.accept(*reference as usize, value(i));
         }
         Ok(())
     }
 
-    fn not_settable(&self, entry: &Entry) -> Option<&'static str> {
-        match self.state.phase {
-            Phase::StepMode if !changes_in_a_run(entry) => {
-                Some("only inputs and tunable parameters change in a run")
+    /// Take over a value that may be set; what depends on it is out of date.
+    fn accept(&mut self, i: usize, value: f64) {
+        let State { values, given, history, motion_start, model, fresh, retune, phase, .. } = &mut self.state;
+        if Layout::<M>::INPUTS.contains(&i) {
+            let given = &mut given[i - Layout::<M>::INPUTS.start];
+            if given.to_bits() != value.to_bits() {
+                *given = value;
+                history.unsettle();
             }
+        } else if Layout::<M>::PORT.contains(&i) {
+            history.unsettle();
+        } else if Layout::<M>::MOTION.contains(&i) {
+            motion_start[i - Layout::<M>::MOTION.start] = value;
+            *model = None; // another start: assemble again
+        }
+        if values[i].to_bits() == value.to_bits() {
+            return;
+        }
+        values[i] = value;
+        *fresh &= !self.table.affects[i];
+        if Layout::<M>::PARAMETERS.contains(&i) {
+            if matches!(phase, Phase::Instantiated | Phase::InitializationMode) {
+                *model = None;
+            } else {
+                *retune = true;
+            }
+        }
+    }
+
+    fn not_settable(&self, entry: &Entry) -> Option<&'static str> {
+        let State { interface, phase, .. } = self.state;
+        let continuous_input =
+            entry.causality == Causality::Input && entry.variability == Variability::Continuous;
+        match phase {
             Phase::Instantiated | Phase::InitializationMode if !entry.has_start() => {
                 Some("it is computed and has no start value")
+            }
+            Phase::StepMode | Phase::EventMode | Phase::ContinuousTimeMode if !changes_in_a_run(entry) => {
+                Some("only inputs and tunable parameters change in a run")
+            }
+            Phase::ContinuousTimeMode if !continuous_input => {
+                Some("only continuous inputs change between events; set it in Event Mode")
+            }
+            Phase::StepMode if interface == Interface::CoSimulationWithEvents && !continuous_input => {
+                Some("only continuous inputs change between steps where Event Mode is used; set it there")
             }
             _ => None,
         }
@@ -271,10 +273,22 @@ impl<M: Model> Instance<M> {
             return Ok(());
         }
         let values = &self.state.values;
-        let given = &values[Layout::<M>::group(Group::Motion)];
         let parameters = M::Parameters::load(&values[Layout::<M>::PARAMETERS]);
-        let model = M::new(&parameters, &M::Motion::load(given))?;
-        let (x, discrete) = model.with_system(Start { t: self.state.start_time, given })?;
+        let mut model = M::new(&parameters, &M::Motion::load(&self.state.motion_start))?;
+        if self.state.interface == Interface::ModelExchange {
+            model.for_model_exchange();
+        }
+        let (x, discrete, names) =
+            model.with_system(Start { t: self.state.start_time, given: &self.state.motion_start })?;
+        if M::MODEL_EXCHANGE {
+            let place = |name: String| {
+                let of = |state: &usize| self.table.variables[*state].name == name;
+                let place = self.table.states.iter().position(of);
+                place.ok_or(Fault::UndeclaredState { state: name })
+            };
+            self.state.places = names.into_iter().map(place).collect::<Result<_, _>>()?;
+        }
+        self.dual_states.resize(x.len(), Dual64::from_re(0.0));
         self.state.x = x;
         self.state.discrete = discrete;
         self.state.model = Some(model);
@@ -287,30 +301,43 @@ impl<M: Model> Instance<M> {
     /// # Errors
     /// [`Fault::Parameter`], [`Fault::MethodNotOffered`], start states without accelerations.
     pub fn exit_initialization(&mut self) -> Result<(), Fault> {
-        let solver = SolverParameters::load(&self.state.values[Layout::<M>::SOLVER]);
-        let solver = Solver::new(solver.settings()?)?;
+        let solver = if self.state.interface == Interface::ModelExchange {
+            None
+        } else {
+            let solver = SolverParameters::load(&self.state.values[Layout::<M>::SOLVER]);
+            Some(Solver::new(solver.settings()?)?)
+        };
+        self.port()?;
         self.assemble()?;
-        self.refresh(ALL_FRESH).map_err(|fault| match fault {
+        self.refresh(ALL_PARTS).map_err(|fault| match fault {
             Fault::Evaluation { source, .. } => ParameterError::Start(source).into(),
             other => other,
         })?;
         if let Some(model) = &self.state.model {
             self.warnings = model.warnings();
         }
-        self.state.solver = Some(solver);
+        let State { unused, values, .. } = &mut self.state;
+        for (unused, state) in unused.iter_mut().zip(&self.table.states) {
+            *unused = values[*state];
+        }
+        self.state.solver = solver;
         self.state.statistics = Statistics::default();
         self.state.guarded = 0.0;
-        self.state.phase = Phase::StepMode;
+        self.begin_inputs();
+        self.state.phase = self.state.interface.after_initialization();
         Ok(())
     }
 
     /// The model with all tunable parameters taken over.
-    fn tuned(&mut self) -> Result<(), Fault> {
+    pub(crate) fn tuned(&mut self) -> Result<(), Fault> {
         self.assemble()?;
         if self.state.retune
             && let Some(model) = &mut self.state.model
         {
             model.retune(&M::Parameters::load(&self.state.values[Layout::<M>::PARAMETERS]));
+            if self.state.interface == Interface::ModelExchange {
+                model.for_model_exchange();
+            }
             self.state.retune = false;
             self.state.guarded = 0.0;
             self.state.fresh = 0;
@@ -318,84 +345,47 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// Compute the groups of outputs that `needed` names and that are out of date.
-    fn refresh(&mut self, needed: u8) -> Result<(), Fault> {
-        if needed & !self.state.fresh == 0 && self.state.model.is_some() {
+    /// Compute the parts of the list that `needed` names and that are out of date.
+    #[inline]
+    pub(crate) fn refresh(&mut self, needed: u8) -> Result<(), Fault> {
+        if needed & !self.state.fresh == 0 && self.state.model.is_some() && !self.state.retune {
             return Ok(());
         }
-        self.tuned()?;
-        let State { values, model, x, discrete, fresh, .. } = &mut self.state;
-        let Some(model) = model else { return Ok(()) };
-        let t = values[0];
-        for group in Group::ALL {
-            let bit = 1 << group as u8;
-            if needed & !*fresh & bit == 0 {
-                continue;
-            }
-            let range = Layout::<M>::group(group);
-            // inputs come before outputs in the list
-            let (before, outputs) = values.split_at_mut(range.start);
-            let outputs = &mut outputs[..range.len()];
-            let u = &before[Layout::<M>::INPUTS];
-            model
-                .with_system(Evaluate { group, t, x, u, d: discrete, values: outputs })
-                .map_err(|source| Fault::Evaluation { t, source })?;
-            if let Some(i) = outputs.iter().position(|v| !v.is_finite()) {
-                let variable = self.table.variables[range.start + i].name.clone();
-                return Err(Fault::NotFinite { variable, value: outputs[i], t });
-            }
-            *fresh |= bit;
-        }
-        Ok(())
+        self.compute(needed)
     }
 
-    /// Advance by one communication step.
-    ///
-    /// # Errors
-    /// Arguments that make no sense; a step that cannot be done (then nothing has changed).
-    pub fn do_step(&mut self, t: f64, step: f64) -> Result<(), Fault> {
-        let now = self.state.values[0];
-        let same_time = (t - now).abs() <= SAME_TIME * now.abs().max(1.0);
-        if !same_time {
-            return Err(Fault::Argument {
-                argument: "currentCommunicationPoint",
-                value: t,
-                allowed: format!("{now} s, where the instance stands"),
-            });
-        }
-        let to = t + step;
-        if !(step > 0.0 && to.is_finite() && to > now) {
-            return Err(Fault::Argument {
-                argument: "communicationStepSize",
-                value: step,
-                allowed: "> 0 s, finite".into(),
-            });
-        }
-        if let Some(stop) = self.state.stop_time
-            && to > stop + SAME_TIME * stop.abs().max(1.0)
-        {
-            return Err(Fault::Argument {
-                argument: "communicationStepSize",
-                value: step,
-                allowed: format!("<= {} s, up to the stop time {stop} s", stop - t),
-            });
-        }
+    fn compute(&mut self, needed: u8) -> Result<(), Fault> {
         self.tuned()?;
-        let State { values, model, x, discrete, solver, statistics, guarded, fresh, .. } = &mut self.state;
-        let (Some(model), Some(solver)) = (model, solver) else {
-            return Ok(());
-        };
-        let h = solver.settings().inner_step(step);
-        let fixed = !solver.settings().method.is_adaptive();
-        let guard = fixed && (h - *guarded).abs() > SAME_STEP * h;
-        let inputs = Layout::<M>::INPUTS;
-        let u = &values[inputs.clone()];
-        let duals = &mut self.duals[inputs];
-        model.with_system(Step { from: now, to, u, guard, duals, x, d: discrete, solver, statistics })?;
-        *guarded = h;
-        *fresh = 0;
-        values[0] = to;
-        SolverCounters::from(*statistics).store(&mut values[Layout::<M>::COUNTERS]);
+        let State { values, model, x, places, discrete: d, fresh, .. } = &mut self.state;
+        let Some(model) = model else { return Ok(()) };
+        let t = values[0];
+        for part in Part::ALL {
+            if needed & !*fresh & part.bit() == 0 {
+                continue;
+            }
+            let range = Layout::<M>::part(part);
+            // inputs come before everything that is computed
+            let (before, outputs) = values.split_at_mut(range.start);
+            let values = &mut outputs[..range.len()];
+            let u = &before[Layout::<M>::INPUTS];
+            match part {
+                Part::Outputs(group) => model.with_system(Evaluate { group, t, x: &*x, u, d, values }),
+                Part::Rates => model.with_system(Rates { t, x: &*x, u, d, places, values }),
+                Part::Indicators => {
+                    let values = &mut *values;
+                    model.with_system(EventIndicators { t, x, u, d, values });
+                    Ok(())
+                }
+            }
+            .map_err(|source| Fault::Evaluation { t, source })?;
+            let values = &outputs[..range.len()];
+            if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+                let variable = self.table.variables[range.start + i].name.clone();
+                let value = values[i];
+                return Err(Fault::NotFinite { variable, value, t });
+            }
+            *fresh |= part.bit();
+        }
         Ok(())
     }
 
@@ -412,7 +402,7 @@ impl<M: Model> Instance<M> {
 
     /// As a fresh instance.
     pub fn reset(&mut self) {
-        self.state = State::new(&self.table);
+        self.state = State::new(&self.table, self.state.interface);
     }
 
     /// Copy of the state.
@@ -427,79 +417,16 @@ impl<M: Model> Instance<M> {
     }
 
     /// Go back to a saved state.
-    pub fn restore(&mut self, saved: &State<M>) {
+    ///
+    /// # Errors
+    /// [`Fault::ForeignState`] for the state of an instance that is used in another way.
+    pub fn restore(&mut self, saved: &State<M>) -> Result<(), Fault> {
+        if saved.interface != self.state.interface {
+            return Err(Fault::ForeignState { saved: saved.interface, instance: self.state.interface });
+        }
         self.state.clone_from(saved);
-    }
-
-    /// d(unknowns) / d(knowns) in the direction `seed`, exact.
-    ///
-    /// # Errors
-    /// Knowns that are not inputs, unknowns that are not outputs.
-    pub fn directional_derivative(
-        &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
-        seed: &[f64],
-        sensitivity: &mut [f64],
-    ) -> Result<(), Fault> {
-        same_length(knowns.len(), seed.len())?;
-        same_length(unknowns.len(), sensitivity.len())?;
-        let not = |variable: &Variable, reason| Fault::NotSettable {
-            variable: variable.name.clone(),
-            phase: "directional derivatives".into(),
-            reason,
-        };
-        let mut needed = 0;
-        for known in knowns {
-            let v = self.variable(*known)?;
-            if v.entry.causality != Causality::Input {
-                return Err(not(v, "knowns are inputs"));
-            }
-        }
-        for unknown in unknowns {
-            let v = self.variable(*unknown)?;
-            if v.entry.causality != Causality::Output {
-                return Err(not(v, "unknowns are outputs"));
-            }
-            needed |= self.table.access[*unknown as usize] & ALL_FRESH;
-        }
-        if let Some(s) = seed.iter().find(|s| !s.is_finite()) {
-            return Err(Fault::Argument { argument: "seed", value: *s, allowed: "finite".into() });
-        }
-        self.tuned()?;
-        let State { values, model, x, discrete, .. } = &mut self.state;
-        let Some(model) = model else { return Ok(()) };
-        let inputs = Layout::<M>::INPUTS;
-        for i in inputs.clone() {
-            self.duals[i] = Dual64::from_re(values[i]);
-        }
-        for (known, s) in knowns.iter().zip(seed) {
-            self.duals[*known as usize].eps += s;
-        }
-        let t = values[0];
-        for group in Group::ALL {
-            if needed & (1 << group as u8) != 0 {
-                let range = Layout::<M>::group(group);
-                let (before, outputs) = self.duals.split_at_mut(range.start);
-                let (u, outputs) = (&before[inputs.clone()], &mut outputs[..range.len()]);
-                model
-                    .with_system(Evaluate { group, t, x, u, d: discrete, values: outputs })
-                    .map_err(|source| Fault::Evaluation { t, source })?;
-            }
-        }
-        for (s, unknown) in sensitivity.iter_mut().zip(unknowns) {
-            *s = self.duals[*unknown as usize].eps;
-        }
+        self.dual_states.resize(self.state.x.len(), Dual64::from_re(0.0));
         Ok(())
-    }
-
-    /// Inputs that a variable depends on directly.
-    ///
-    /// # Errors
-    /// [`Fault::UnknownReference`].
-    pub fn dependencies(&self, reference: u32) -> Result<Vec<usize>, Fault> {
-        self.variable(reference)?;
-        Ok(self.table.dependencies(reference as usize))
     }
 }
 

@@ -1,4 +1,6 @@
-//! Jobs on a system whose number of states is known inside only: start, outputs, step.
+//! Jobs on a system whose number of states is known inside only: start, values, events, step.
+
+use std::cell::RefCell;
 
 use integrators::{
     Complex, Indicators, Method, Ode, Reached, Solver, Statistics, StepError, largest_stable_step, violates,
@@ -10,11 +12,15 @@ use model::{
 use num_dual::Dual64;
 
 use crate::Fault;
+use crate::inputs::Polynomials;
+
+/// States that are off their manifold by more are brought back at an event.
+const OFF_MANIFOLD: f64 = 1e-8;
 
 /// Largest number of updates for events at one time.
 const MAX_UPDATES: usize = 100;
 
-/// States and discrete states at the start.
+/// States and discrete states at the start, with the names of the states.
 pub(crate) struct Start<'a> {
     pub(crate) t: f64,
     /// Start values of the motion group
@@ -22,10 +28,10 @@ pub(crate) struct Start<'a> {
 }
 
 impl<M: Model> Visitor<M> for Start<'_> {
-    type Output = Result<(Vec<f64>, M::Discrete), ParameterError>;
+    type Output = Result<(Vec<f64>, M::Discrete, Vec<String>), ParameterError>;
     fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) -> Self::Output {
         let (x, d) = system.start(self.t, &M::Motion::<f64>::load(self.given))?;
-        Ok((x.to_vec(), d))
+        Ok((x.to_vec(), d, system.state_names().to_vec()))
     }
 }
 
@@ -33,7 +39,7 @@ impl<M: Model> Visitor<M> for Start<'_> {
 pub(crate) struct Evaluate<'a, M: Model, S> {
     pub(crate) group: Group,
     pub(crate) t: f64,
-    pub(crate) x: &'a [f64],
+    pub(crate) x: &'a [S],
     pub(crate) u: &'a [S],
     pub(crate) d: &'a M::Discrete,
     pub(crate) values: &'a mut [S],
@@ -42,23 +48,174 @@ pub(crate) struct Evaluate<'a, M: Model, S> {
 impl<M: Model, S: model::Scalar> Visitor<M> for Evaluate<'_, M, S> {
     type Output = Result<(), EvaluationError>;
     fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) -> Self::Output {
-        let x: [S; N] = std::array::from_fn(|i| S::lift(self.x[i]));
+        let x: [S; N] = std::array::from_fn(|i| self.x[i]);
         system.evaluate(self.group, S::lift(self.t), &x, &M::Inputs::<S>::load(self.u), self.d, self.values)
     }
+}
+
+/// Time derivatives of all declared states; zero for those that the system does not use.
+pub(crate) struct Rates<'a, M: Model, S> {
+    pub(crate) t: f64,
+    pub(crate) x: &'a [S],
+    pub(crate) u: &'a [S],
+    pub(crate) d: &'a M::Discrete,
+    /// Place of each state among the declared ones
+    pub(crate) places: &'a [usize],
+    pub(crate) values: &'a mut [S],
+}
+
+impl<M: Model, S: model::Scalar> Visitor<M> for Rates<'_, M, S> {
+    type Output = Result<(), EvaluationError>;
+    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) -> Self::Output {
+        let x: [S; N] = std::array::from_fn(|i| self.x[i]);
+        let rates = system.rates(S::lift(self.t), &x, &M::Inputs::<S>::load(self.u), self.d)?;
+        self.values.fill(S::lift(0.0));
+        for (place, rate) in self.places.iter().zip(rates) {
+            self.values[*place] = rate;
+        }
+        Ok(())
+    }
+}
+
+/// Event indicators; 1 for those that the system does not use.
+pub(crate) struct EventIndicators<'a, M: Model> {
+    pub(crate) t: f64,
+    pub(crate) x: &'a [f64],
+    pub(crate) u: &'a [f64],
+    pub(crate) d: &'a M::Discrete,
+    pub(crate) values: &'a mut [f64],
+}
+
+impl<M: Model> Visitor<M> for EventIndicators<'_, M> {
+    type Output = ();
+    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) {
+        let x: [f64; N] = std::array::from_fn(|i| self.x[i]);
+        let indicators = system.indicators(self.t, &x, &M::Inputs::<f64>::load(self.u), self.d);
+        self.values.fill(1.0);
+        self.values[..Z].copy_from_slice(&indicators);
+    }
+}
+
+/// Typical magnitudes of the declared states, where the system knows them.
+pub(crate) struct Nominals<'a> {
+    pub(crate) places: &'a [usize],
+    pub(crate) values: &'a mut [f64],
+}
+
+impl<M: Model> Visitor<M> for Nominals<'_> {
+    type Output = ();
+    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) {
+        for (place, nominal) in self.places.iter().zip(system.nominals()) {
+            if nominal.is_finite() {
+                self.values[*place] = nominal;
+            }
+        }
+    }
+}
+
+/// True if the states have left their manifold.
+pub(crate) struct Astray<'a> {
+    pub(crate) x: &'a [f64],
+}
+
+impl<M: Model> Visitor<M> for Astray<'_> {
+    type Output = bool;
+    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) -> bool {
+        let x: [f64; N] = std::array::from_fn(|i| self.x[i]);
+        system.off_manifold(&x) > OFF_MANIFOLD
+    }
+}
+
+/// One pass of the event iteration.
+pub(crate) struct Update<'a, M: Model> {
+    pub(crate) t: f64,
+    /// An indicator has crossed zero
+    pub(crate) crossed: bool,
+    pub(crate) u: &'a [f64],
+    pub(crate) x: &'a mut [f64],
+    pub(crate) d: &'a mut M::Discrete,
+}
+
+/// What an event did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Updated {
+    /// States or discrete states changed
+    pub(crate) changed: bool,
+    /// States changed
+    pub(crate) states: bool,
+    /// Another event is due now
+    pub(crate) again: bool,
+    /// Time of the next event
+    pub(crate) next: Option<f64>,
+}
+
+impl<M: Model> Visitor<M> for Update<'_, M> {
+    type Output = Updated;
+    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) -> Updated {
+        let before: [f64; N] = std::array::from_fn(|i| self.x[i]);
+        let mut x = before;
+        if system.off_manifold(&x) > OFF_MANIFOLD {
+            system.normalise(&mut x);
+        }
+        let mut d = *self.d;
+        let event = system.next_event(&d).filter(|event| due(*event, self.t));
+        if self.crossed || event.is_some() {
+            let t = event.map_or(self.t, |event| event.max(self.t));
+            d = system.update(t, &mut x, &M::Inputs::<f64>::load(self.u), &d);
+        }
+        let states = x.map(f64::to_bits) != before.map(f64::to_bits);
+        let changed = states || d != *self.d;
+        self.x.copy_from_slice(&x);
+        *self.d = d;
+        let next = system.next_event(&d);
+        Updated { changed, states, again: next.is_some_and(|event| due(event, self.t)), next }
+    }
+}
+
+/// True if the time of an event has come.
+fn due(event: f64, t: f64) -> bool {
+    event <= t + 4.0 * f64::EPSILON * t.abs()
 }
 
 /// The system under its inputs as an initial value problem.
 struct Driven<'a, const N: usize, const Z: usize, Y: System<N, Z>> {
     system: &'a Y,
+    /// Inputs that keep their values
     u: <Y::Model as Model>::Inputs<f64>,
+    /// Inputs that move
+    course: Option<RefCell<Course<'a>>>,
     d: <Y::Model as Model>::Discrete,
+}
+
+/// Moving inputs: their polynomials, and the list of all inputs into which these are written.
+pub(crate) struct Course<'a> {
+    pub(crate) polynomials: &'a Polynomials,
+    pub(crate) u: &'a mut [f64],
+}
+
+/// The inputs at `t`, in `$u`; they are loaded only if one of them moves.
+macro_rules! inputs_at {
+    ($driven:expr, $t:expr, $u:ident) => {
+        let moving;
+        let $u = match &$driven.course {
+            None => &$driven.u,
+            Some(course) => {
+                let mut course = course.borrow_mut();
+                let Course { polynomials, u } = &mut *course;
+                polynomials.evaluate($t, u);
+                moving = <Y::Model as Model>::Inputs::<f64>::load(u);
+                &moving
+            }
+        };
+    };
 }
 
 impl<const N: usize, const Z: usize, Y: System<N, Z>> Ode<N> for Driven<'_, N, Z, Y> {
     type Error = EvaluationError;
     #[inline]
     fn rhs(&self, t: f64, x: &[f64; N]) -> Result<[f64; N], EvaluationError> {
-        self.system.rates(t, x, &self.u, &self.d)
+        inputs_at!(self, t, u);
+        self.system.rates(t, x, u, &self.d)
     }
     #[inline]
     fn project(&self, t: f64, x: &mut [f64; N]) -> Result<bool, EvaluationError> {
@@ -71,18 +228,19 @@ impl<const N: usize, const Z: usize, Y: System<N, Z>> Ode<N> for Driven<'_, N, Z
 
 impl<const N: usize, const Z: usize, Y: System<N, Z>> Indicators<N, Z> for Driven<'_, N, Z, Y> {
     fn indicators(&self, t: f64, x: &[f64; N]) -> [f64; Z] {
-        self.system.indicators(t, x, &self.u, &self.d)
+        inputs_at!(self, t, u);
+        self.system.indicators(t, x, u, &self.d)
     }
 }
 
 impl<const N: usize, const Z: usize, Y: System<N, Z>> Driven<'_, N, Z, Y> {
     /// Carry out the time events that are due at `t`.
     fn pass_events(&mut self, t: f64, x: &mut [f64; N], solver: &mut Solver) {
-        let due = |event: f64| event <= t + 4.0 * f64::EPSILON * t.abs();
         for _ in 0..MAX_UPDATES {
             match self.system.next_event(&self.d) {
-                Some(event) if due(event) => {
-                    self.d = self.system.update(event.max(t), x, &self.u, &self.d);
+                Some(event) if due(event, t) => {
+                    inputs_at!(self, t, u);
+                    self.d = self.system.update(event.max(t), x, u, &self.d);
                     solver.reset();
                 }
                 _ => return,
@@ -96,6 +254,10 @@ pub(crate) struct Step<'a, M: Model> {
     pub(crate) from: f64,
     pub(crate) to: f64,
     pub(crate) u: &'a [f64],
+    /// Inputs that move
+    pub(crate) course: Option<Course<'a>>,
+    /// Leave events at the end of the step to Event Mode
+    pub(crate) leave_events: bool,
     /// Look at the eigenvalues first (fixed-step explicit methods)
     pub(crate) guard: bool,
     pub(crate) duals: &'a mut [Dual64],
@@ -106,11 +268,12 @@ pub(crate) struct Step<'a, M: Model> {
 }
 
 impl<M: Model> Visitor<M> for Step<'_, M> {
-    type Output = Result<(), Fault>;
+    /// An event is left for Event Mode
+    type Output = Result<bool, Fault>;
     fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(
         self,
         system: &Y,
-    ) -> Result<(), Fault> {
+    ) -> Result<bool, Fault> {
         let Self { from, to, u, .. } = self;
         let fault = |e| Fault::step(from, to - from, &e, || system.state_names());
         let mut x: [f64; N] = std::array::from_fn(|i| self.x[i]);
@@ -122,10 +285,17 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
                 stable(&solver, (from, to), &eigenvalues.map(Complex::from))?;
             } // not finite: the first stage meets it and names the state
         }
-        let mut driven = Driven { system, u: M::Inputs::<f64>::load(u), d: *self.d };
+        let mut driven = Driven {
+            system,
+            u: M::Inputs::<f64>::load(u),
+            course: self.course.map(RefCell::new),
+            d: *self.d,
+        };
         let mut t = from;
         loop {
-            driven.pass_events(t, &mut x, &mut solver);
+            if t < to || !self.leave_events {
+                driven.pass_events(t, &mut x, &mut solver);
+            }
             if t >= to {
                 break;
             }
@@ -139,7 +309,8 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
                 Reached::End => t = target,
                 Reached::Event { t: at, .. } => {
                     t = at;
-                    driven.d = system.update(t, &mut x, &driven.u, &driven.d);
+                    inputs_at!(driven, t, u);
+                    driven.d = system.update(t, &mut x, u, &driven.d);
                     solver.reset();
                 }
             }
@@ -148,7 +319,7 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
         *self.d = driven.d;
         *self.solver = solver;
         *self.statistics = statistics;
-        Ok(())
+        Ok(system.next_event(&driven.d).is_some_and(|event| due(event, to)))
     }
 }
 

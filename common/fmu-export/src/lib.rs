@@ -9,20 +9,29 @@
 //! its program, which describes and packs it.
 
 pub mod c_abi;
+mod derivatives;
 mod describe;
+mod events;
+mod exchange;
 mod fault;
+mod inputs;
 mod instance;
 mod jobs;
 mod package;
 mod phase;
 mod solver;
+mod state;
+mod step;
 mod table;
 mod unit;
 
 pub use describe::model_description;
+pub use events::Event;
 pub use fault::{Fault, Status};
-pub use instance::{Instance, State};
+pub use inputs::{InputTreatment, PortParameters, PortReset};
+pub use instance::Instance;
 pub use package::{PackError, archive, run};
-pub use phase::{Phase, Rule};
+pub use phase::{Interface, Phase, Rule};
 pub use solver::{SolverCounters, SolverMethod, SolverParameters};
+pub use state::State;
 pub use table::{Table, Variable};

@@ -4,8 +4,9 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
-use model::{Causality, Entry, Group, Kind, Model, Variability, Variables};
+use model::{Causality, Entry, Group, Kind, Model, Variability, Variables, count_states};
 
+use crate::inputs::{PortParameters, PortReset};
 use crate::{SolverCounters, SolverParameters};
 
 /// Where each group of variables of the model `M` lies in the list, fixed at compile time.
@@ -13,39 +14,102 @@ use crate::{SolverCounters, SolverParameters};
 pub(crate) struct Layout<M>(PhantomData<M>);
 
 impl<M: Model> Layout<M> {
-    /// Sections: time, parameters, solver parameters, inputs, four output groups, counters.
-    const SECTIONS: [&'static [Entry]; 9] = [
+    /// Inputs may follow polynomials inside a step.
+    pub(crate) const TREATED: bool =
+        M::PORT_TREATMENT && !<M::Inputs<f64> as Variables<f64>>::TABLE.is_empty();
+    /// Number of declared states.
+    pub(crate) const STATES: usize = if M::MODEL_EXCHANGE {
+        count_states(<M::Motion<f64> as Variables<f64>>::TABLE)
+            + count_states(<M::Energy<f64> as Variables<f64>>::TABLE)
+    } else {
+        0
+    };
+    /// Sections before the rates: time, parameters, solver and port parameters, inputs, port.reset,
+    /// four output groups.
+    const SECTIONS: [&'static [Entry]; 10] = [
         &[TIME],
         M::Parameters::TABLE,
         <SolverParameters as Variables<f64>>::TABLE,
+        if Self::TREATED { <PortParameters as Variables<f64>>::TABLE } else { &[] },
         <M::Inputs<f64> as Variables<f64>>::TABLE,
+        if Self::TREATED { <PortReset as Variables<f64>>::TABLE } else { &[] },
         <M::Motion<f64> as Variables<f64>>::TABLE,
         <M::Inertia<f64> as Variables<f64>>::TABLE,
         <M::Dynamics<f64> as Variables<f64>>::TABLE,
         <M::Energy<f64> as Variables<f64>>::TABLE,
-        <SolverCounters as Variables<f64>>::TABLE,
     ];
-    const ENDS: [usize; 9] = {
-        let mut ends = [0; 9];
+    /// Ends of these sections, then of rates, indicators and counters.
+    const ENDS: [usize; 13] = {
+        let mut ends = [0; 13];
         let (mut at, mut i) = (0, 0);
-        while i < 9 {
-            at += Self::SECTIONS[i].len();
+        while i < 13 {
+            at += match i {
+                10 => Self::STATES,
+                11 => M::INDICATORS.len(),
+                12 => <SolverCounters as Variables<f64>>::TABLE.len(),
+                i => Self::SECTIONS[i].len(),
+            };
             ends[i] = at;
             i += 1;
         }
         ends
     };
-    pub(crate) const COUNT: usize = Self::ENDS[8];
-    pub(crate) const PARAMETERS: Range<usize> = Self::ENDS[0]..Self::ENDS[1];
-    pub(crate) const SOLVER: Range<usize> = Self::ENDS[1]..Self::ENDS[2];
-    pub(crate) const INPUTS: Range<usize> = Self::ENDS[2]..Self::ENDS[3];
-    pub(crate) const COUNTERS: Range<usize> = Self::ENDS[7]..Self::ENDS[8];
+    pub(crate) const PARAMETERS: Range<usize> = Self::section(1);
+    pub(crate) const SOLVER: Range<usize> = Self::section(2);
+    pub(crate) const PORT: Range<usize> = Self::section(3);
+    pub(crate) const INPUTS: Range<usize> = Self::section(4);
+    pub(crate) const RESET: Range<usize> = Self::section(5);
+    pub(crate) const MOTION: Range<usize> = Self::section(6);
+    pub(crate) const RATES: Range<usize> = Self::section(10);
+    pub(crate) const COUNTERS: Range<usize> = Self::section(12);
 
-    pub(crate) const fn group(group: Group) -> Range<usize> {
-        let section = 4 + group as usize;
-        Self::ENDS[section - 1]..Self::ENDS[section]
+    const fn section(i: usize) -> Range<usize> {
+        Self::ENDS[i - 1]..Self::ENDS[i]
+    }
+
+    pub(crate) const fn part(part: Part) -> Range<usize> {
+        Self::section(match part {
+            Part::Outputs(group) => 6 + group as usize,
+            Part::Rates => 10,
+            Part::Indicators => 11,
+        })
     }
 }
+
+/// What is computed together, on the first Get after a change.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Part {
+    /// A group of outputs
+    Outputs(Group),
+    /// Time derivatives of the states
+    Rates,
+    /// Event indicators
+    Indicators,
+}
+
+impl Part {
+    /// All parts, in the order of the list.
+    pub(crate) const ALL: [Self; 6] = [
+        Self::Outputs(Group::Motion),
+        Self::Outputs(Group::Inertia),
+        Self::Outputs(Group::Dynamics),
+        Self::Outputs(Group::Energy),
+        Self::Rates,
+        Self::Indicators,
+    ];
+
+    /// The bit that stands for the part.
+    pub(crate) const fn bit(self) -> u8 {
+        match self {
+            Self::Outputs(group) => 1 << group as u8,
+            Self::Rates => 1 << 4,
+            Self::Indicators => 1 << 5,
+        }
+    }
+}
+
+/// Bits of all parts.
+pub(crate) const ALL_PARTS: u8 = 0x3f;
 
 /// The independent variable.
 pub(crate) const TIME: Entry = {
@@ -62,14 +126,20 @@ pub struct Variable {
     pub name: String,
     /// Everything else
     pub entry: Entry,
+    /// Value reference of the state whose time derivative this is
+    pub derivative_of: Option<usize>,
 }
 
-/// The list with names, and per variable what Get has to know.
+/// The list with names, and per variable what Get and Set have to know.
 #[derive(Debug, Clone)]
 pub struct Table {
     pub(crate) variables: Vec<Variable>,
-    /// Bit i: the variable belongs to output group i; [`FLOAT`]: its type is Float64
+    /// Value references of the continuous states
+    pub(crate) states: Vec<usize>,
+    /// Bits of the part that the variable belongs to; [`FLOAT`]: its type is Float64
     pub(crate) access: Vec<u8>,
+    /// Bits of the parts that depend on the variable
+    pub(crate) affects: Vec<u8>,
 }
 
 /// Marks Float64 variables in [`Table::access`].
@@ -79,18 +149,34 @@ impl Table {
     /// The variables of the model `M`.
     #[must_use]
     pub fn new<M: Model>() -> Self {
-        let mut variables = Vec::with_capacity(Layout::<M>::COUNT);
-        for section in Layout::<M>::SECTIONS {
-            variables.extend(section.iter().map(|entry| Variable { name: entry.name(), entry: *entry }));
+        let plain = |name: String, entry: Entry| Variable { name, entry, derivative_of: None };
+        let mut variables: Vec<_> =
+            Layout::<M>::SECTIONS.into_iter().flatten().map(|entry| plain(entry.name(), *entry)).collect();
+        let mut states = Vec::new();
+        if M::MODEL_EXCHANGE {
+            states.extend((0..variables.len()).filter(|i| variables[*i].entry.rate.is_some()));
         }
-        let mut access: Vec<u8> =
+        for state in &states {
+            variables.push(derivative(*state, &variables[*state]));
+        }
+        variables.extend(M::INDICATORS.iter().map(|name| plain((*name).into(), INDICATOR)));
+        let counters = <SolverCounters as Variables<f64>>::TABLE.iter();
+        variables.extend(counters.map(|entry| plain(entry.name(), *entry)));
+
+        let access =
             variables.iter().map(|v| if v.entry.kind == Kind::Float64 { FLOAT } else { 0 }).collect();
-        for group in Group::ALL {
-            for a in &mut access[Layout::<M>::group(group)] {
-                *a |= 1 << group as u8;
+        let mut table = Self { affects: vec![0; variables.len()], variables, states, access };
+        table.affects[Layout::<M>::PARAMETERS].fill(ALL_PARTS);
+        table.affects[Layout::<M>::INPUTS].fill(Part::Indicators.bit());
+        for part in Part::ALL {
+            for i in Layout::<M>::part(part) {
+                table.access[i] |= part.bit();
+                for known in table.dependencies(i) {
+                    table.affects[known] |= part.bit();
+                }
             }
         }
-        Self { variables, access }
+        table
     }
 
     /// The variables in the order of their value references.
@@ -99,15 +185,26 @@ impl Table {
         &self.variables
     }
 
+    /// Value references of the continuous states.
+    #[must_use]
+    pub fn states(&self) -> &[usize] {
+        &self.states
+    }
+
     /// Start values of all variables.
     pub(crate) fn start_values(&self) -> Vec<f64> {
         self.variables.iter().map(|v| v.entry.start).collect()
     }
 
-    /// Value references of the inputs that an output depends on directly, ascending.
-    pub(crate) fn dependencies(&self, output: usize) -> Vec<usize> {
-        let depends = self.variables[output].entry.depends;
-        let component = self.variables[output].name.rsplit('.').next().unwrap_or_default();
+    /// True if the variable is a continuous state.
+    pub(crate) fn is_state(&self, reference: usize) -> bool {
+        self.states.binary_search(&reference).is_ok()
+    }
+
+    /// Value references of the inputs and states that a variable depends on directly, ascending.
+    pub(crate) fn dependencies(&self, unknown: usize) -> Vec<usize> {
+        let depends = self.variables[unknown].entry.depends;
+        let component = self.variables[unknown].name.rsplit('.').next().unwrap_or_default();
         let covers = |name: &str| {
             depends.iter().any(|d| {
                 if let Some(same) = d.strip_suffix('@') {
@@ -116,9 +213,13 @@ impl Table {
                 name.strip_prefix(d).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
             })
         };
-        let is_input = |v: &Variable| v.entry.causality == Causality::Input;
         (0..self.variables.len())
-            .filter(|i| is_input(&self.variables[*i]) && covers(&self.variables[*i].name))
+            .filter(|i| {
+                let known = &self.variables[*i];
+                let is_state = self.is_state(*i);
+                is_state && *i == unknown
+                    || (is_state || known.entry.causality == Causality::Input) && covers(&known.name)
+            })
             .collect()
     }
 
@@ -126,7 +227,7 @@ impl Table {
     pub(crate) fn token(&self, model: &str) -> String {
         let mut hash = Fnv::new();
         hash.write(model.as_bytes());
-        for Variable { name, entry } in &self.variables {
+        for Variable { name, entry, .. } in &self.variables {
             hash.write(name.as_bytes());
             hash.write(entry.unit.as_bytes());
             hash.write(kind_name(entry.kind).as_bytes());
@@ -143,6 +244,25 @@ impl Table {
         format!("{{{}-{}-{}-{}-{}}}", &h[..8], &h[8..12], &h[12..16], &h[16..20], &h[20..])
     }
 }
+
+/// The time derivative of a state as a variable.
+fn derivative(reference: usize, state: &Variable) -> Variable {
+    let mut entry = Entry::scalar("", Kind::Float64);
+    entry.description = "Time derivative of the state";
+    entry.causality = Causality::Local;
+    if let Some(rate) = state.entry.rate {
+        (entry.unit, entry.depends) = (rate.unit, rate.depends);
+    }
+    Variable { name: format!("der({})", state.name), entry, derivative_of: Some(reference) }
+}
+
+/// An event indicator.
+const INDICATOR: Entry = {
+    let mut entry = Entry::scalar("", Kind::Float64);
+    entry.description = "Event indicator: a change of sign is an event";
+    entry.causality = Causality::Local;
+    entry
+};
 
 /// FNV-1a with 128 bits: the same on every platform and toolchain.
 struct Fnv(u128);

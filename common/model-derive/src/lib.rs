@@ -14,7 +14,9 @@
 //!
 //! Keys of `var`: `name`, `prefix`, `start` (a value, or `[x, y, z]`), `item` (an enumeration's
 //! variant), `min`, `max`, `above` (exclusive lower bound), `nominal`, `unit`, `tunable`,
-//! `discrete`, `local`, `exact`, `approx`, `depends` (a list of inputs or prefixes of inputs).
+//! `discrete`, `local`, `exact`, `approx`, `state`, `depends` and, for the time derivative of a state,
+//! `rate_depends`: names or prefixes of inputs and states, as one list `["a", "b"]`, the name of a
+//! constant of type `&[&str]`, or a list of such lists, one per component.
 //! A struct with a type parameter `S` is generic over the scalar.
 
 use proc_macro::TokenStream;
@@ -78,7 +80,37 @@ struct FieldAttributes {
     discrete: bool,
     local: bool,
     initial: Option<&'static str>,
-    depends: Vec<String>,
+    state: bool,
+    depends: Vec<Tokens>,
+    rate_depends: Vec<Tokens>,
+}
+
+/// One list of names for all components, or one per component.
+fn lists(e: &Expr) -> Vec<Tokens> {
+    let is_name = |e: &Expr| matches!(e, Expr::Lit(ExprLit { lit: Lit::Str(_), .. }));
+    match e {
+        Expr::Array(list) if !list.elems.is_empty() && !list.elems.iter().all(is_name) => {
+            list.elems.iter().flat_map(lists).collect()
+        }
+        Expr::Array(list) => {
+            let names = &list.elems;
+            vec![quote!(&[#names])]
+        }
+        e => vec![quote!(#e)],
+    }
+}
+
+/// The unit per second: `rad` -> `rad/s`, `m/s` -> `m/s2`, `J` -> `W`.
+fn per_second(unit: &str) -> String {
+    match unit {
+        "" => "1/s".into(),
+        "J" => "W".into(),
+        unit => match unit.rsplit_once('/') {
+            None => format!("{unit}/s"),
+            Some((above, "s")) => format!("{above}/s2"),
+            Some((above, below)) => format!("{above}/{below}.s"),
+        },
+    }
 }
 
 /// A start value as f64: Booleans become 0 and 1.
@@ -127,16 +159,9 @@ fn field_attributes(field: &Field) -> syn::Result<FieldAttributes> {
                         _ => a.min = Some(quote!((#e) + f64::MIN_POSITIVE)),
                     }
                 }
-                "depends" => {
-                    let list: syn::ExprArray = meta.value()?.parse()?;
-                    for e in list.elems {
-                        if let Expr::Lit(ExprLit { lit: Lit::Str(s), .. }) = e {
-                            a.depends.push(s.value());
-                        } else {
-                            return Err(meta.error("depends takes a list of names"));
-                        }
-                    }
-                }
+                "state" => a.state = true,
+                "depends" => a.depends = lists(&meta.value()?.parse()?),
+                "rate_depends" => a.rate_depends = lists(&meta.value()?.parse()?),
                 _ => return Err(meta.error("unknown key")),
             }
             Ok(())
@@ -203,8 +228,10 @@ fn field_tokens(
     let (description, unit) = documentation(&field.attrs);
     let unit = a.unit.or(unit).unwrap_or_default();
     let unit = if unit == "1" || unit == "-" { String::new() } else { unit };
-    let (prefix, start, depends, tunable, discrete) =
-        (&a.prefix, &a.start, &a.depends, a.tunable, a.discrete);
+    let (prefix, start, tunable, discrete) = (&a.prefix, &a.start, a.tunable, a.discrete);
+    let (depends, rate_depends) = (&a.depends, &a.rate_depends);
+    let rate_unit = a.state.then(|| per_second(&unit)).map(|u| quote!(#u));
+    let rate_unit = option(rate_unit.as_ref());
     let field_causality = format_ident!("{}", if a.local { "Local" } else { causality });
     let initial = format_ident!("{}", a.initial.unwrap_or("Calculated"));
     let (min, max, nominal) = (option(a.min.as_ref()), option(a.max.as_ref()), option(a.nominal.as_ref()));
@@ -224,6 +251,8 @@ fn field_tokens(
                 max: #max,
                 nominal: #nominal,
                 depends: &[#(#depends),*],
+                rate_unit: #rate_unit,
+                rate_depends: &[#(#rate_depends),*],
             });
             at += #table.len();
         },

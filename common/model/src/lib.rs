@@ -29,7 +29,8 @@ pub use mechanics::Scalar;
 pub use model_derive::{Enumeration, Variables};
 pub use system::{Experiment, Group, Model, Outputs, System, Visitor};
 pub use variable::{
-    Attributes, Causality, Entry, EnumType, Initial, Item, Kind, Variability, Variables, fill,
+    Attributes, Causality, Entry, EnumType, Initial, Item, Kind, Rate, Variability, Variables, count_states,
+    fill,
 };
 
 // The derives name this crate by its path, also inside it.
@@ -66,7 +67,12 @@ mod tests {
         /// Rank
         #[var(name = "loop.rank", local)]
         rank: S,
+        /// Spin [rad/s]
+        #[var(name = "spin", state, depends = ["P.F"], rate_depends = [["P.F.x"], TURN, []])]
+        spin: Vector3<S>,
     }
+
+    const TURN: &[&str] = &["angle", "spin"];
 
     #[derive(Debug, Clone, PartialEq, Variables)]
     #[variables(parameter)]
@@ -90,7 +96,7 @@ mod tests {
     #[test]
     fn the_table_has_names_units_and_bounds() {
         let names: Vec<_> = <Out<f64> as Variables<f64>>::TABLE.iter().map(Entry::name).collect();
-        assert_eq!(names, ["P.r.x", "P.r.y", "P.r.z", "angle.theta", "loop.rank"]);
+        assert_eq!(names[..5], ["P.r.x", "P.r.y", "P.r.z", "angle.theta", "loop.rank"]);
         let table = <Out<f64> as Variables<f64>>::TABLE;
         assert_eq!((table[0].unit, table[0].description), ("m", "Position"));
         assert_eq!(table[0].causality, Causality::Output);
@@ -103,6 +109,18 @@ mod tests {
             panic!("enumeration")
         };
         assert_eq!((kinds.items[0].name, kinds.items[1].value), ("first_kind", 2));
+    }
+
+    #[test]
+    fn states_know_what_belongs_to_their_derivatives() {
+        let table = <Out<f64> as Variables<f64>>::TABLE;
+        assert_eq!(count_states(table), 3);
+        let rates: Vec<_> = table.iter().filter_map(|v| v.rate).collect();
+        assert!(rates.iter().all(|r| r.unit == "rad/s2"));
+        assert_eq!(rates[0].depends, ["P.F.x"]);
+        assert_eq!(rates[1].depends, TURN);
+        assert!(rates[2].depends.is_empty());
+        assert!(table[5..].iter().all(|v| v.depends == ["P.F"]));
     }
 
     #[test]

@@ -40,6 +40,12 @@ pub trait Model: Clone + Sized + 'static {
     const DESCRIPTION: &'static str;
     /// A sensible run
     const EXPERIMENT: Experiment;
+    /// Offered for Model Exchange too: the variables marked `state` are its continuous states
+    const MODEL_EXCHANGE: bool = true;
+    /// Inputs may follow polynomials inside a step (`port.*`); false: always held
+    const PORT_TREATMENT: bool = true;
+    /// Names of the event indicators; a system with fewer uses the first ones
+    const INDICATORS: &'static [&'static str] = &[];
     /// Constants of a run
     type Parameters: Variables<f64>;
     /// Inputs
@@ -65,7 +71,7 @@ pub trait Model: Clone + Sized + 'static {
     /// Take over changed tunable parameters; nothing else may change.
     fn retune(&mut self, parameters: &Self::Parameters);
 
-    /// What differs when a host integrates the states (no projection after steps).
+    /// Leave out what acts between the steps of the own solver: a foreign one integrates the rates.
     fn for_model_exchange(&mut self) {}
 
     /// Cases that are allowed but probably not meant, as log messages.
@@ -164,7 +170,7 @@ pub trait System<const N: usize, const Z: usize> {
         d: &<Self::Model as Model>::Discrete,
     ) -> Result<<Self::Model as Model>::Energy<S>, EvaluationError>;
 
-    /// Names of the states: variables of the motion group, or energy integrals.
+    /// Names of the states: variables marked `state` in the motion and the energy group.
     fn state_names(&self) -> [String; N];
 
     /// Typical magnitude of each state for error control; infinite: does not count.
@@ -180,15 +186,14 @@ pub trait System<const N: usize, const Z: usize> {
         Ok(false)
     }
 
-    /// How far orientations are off their manifold (unit quaternions, unit vectors).
+    /// How far unit quaternions and the like are from where they belong; smooth constraints, which the
+    /// rates hold, do not count.
     fn off_manifold(&self, _x: &[f64; N]) -> f64 {
         0.0
     }
 
-    /// Bring orientations back on their manifold; true if they changed.
-    fn normalise(&self, _x: &mut [f64; N]) -> bool {
-        false
-    }
+    /// Bring the states back from [`System::off_manifold`].
+    fn normalise(&self, _x: &mut [f64; N]) {}
 
     /// Functions whose sign changes are events.
     fn indicators(

@@ -100,8 +100,19 @@ pub struct Entry {
     pub max: f64,
     /// Typical magnitude
     pub nominal: f64,
-    /// Inputs that the value depends on directly: names, groups by prefix (`P.F`), or the same
-    /// component of a group (`A.r.@`)
+    /// Inputs and states (or groups of them, by prefix) that the value depends on directly; a state
+    /// depends on itself without being named
+    pub depends: &'static [&'static str],
+    /// Present for a state
+    pub rate: Option<Rate>,
+}
+
+/// What belongs to the time derivative of a state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rate {
+    /// Unit of the derivative
+    pub unit: &'static str,
+    /// Inputs and states (or groups of them, by prefix) that the derivative depends on directly
     pub depends: &'static [&'static str],
 }
 
@@ -130,8 +141,24 @@ pub struct Attributes {
     pub max: Option<f64>,
     /// Typical magnitude
     pub nominal: Option<f64>,
-    /// Inputs that the value depends on directly
-    pub depends: &'static [&'static str],
+    /// Inputs and states that the value depends on directly: none, one list for all, or one per component
+    pub depends: &'static [&'static [&'static str]],
+    /// For a state: unit of its time derivative
+    pub rate_unit: Option<&'static str>,
+    /// The same lists for the time derivative
+    pub rate_depends: &'static [&'static [&'static str]],
+}
+
+/// The list of a component.
+const fn of_component(
+    lists: &'static [&'static [&'static str]],
+    component: usize,
+) -> &'static [&'static str] {
+    match lists.len() {
+        0 => &[],
+        1 => lists[0],
+        _ => lists[component],
+    }
 }
 
 impl Entry {
@@ -155,6 +182,7 @@ impl Entry {
             max: f64::INFINITY,
             nominal: 1.0,
             depends: &[],
+            rate: None,
         }
     }
 
@@ -215,7 +243,10 @@ impl Entry {
             self.nominal = nominal;
         }
         if self.depends.is_empty() {
-            self.depends = a.depends;
+            self.depends = of_component(a.depends, component);
+        }
+        if let Some(unit) = a.rate_unit {
+            self.rate = Some(Rate { unit, depends: of_component(a.rate_depends, component) });
         }
         self
     }
@@ -226,6 +257,19 @@ impl Entry {
         matches!(self.causality, Causality::Parameter | Causality::Input)
             || matches!(self.initial, Initial::Exact | Initial::Approx)
     }
+}
+
+/// Number of states among the variables of a table.
+#[must_use]
+pub const fn count_states(table: &[Entry]) -> usize {
+    let (mut count, mut i) = (0, 0);
+    while i < table.len() {
+        if table[i].rate.is_some() {
+            count += 1;
+        }
+        i += 1;
+    }
+    count
 }
 
 /// Write the entries of a field into a table under construction.

@@ -1,6 +1,6 @@
 //! What the tests share: an instance addressed by names.
 
-use fmu_export::{Fault, Instance, Table};
+use fmu_export::{Fault, Instance, Interface, Table};
 use model::{Kind, Model};
 
 /// An instance whose variables are addressed by name.
@@ -13,11 +13,17 @@ pub struct Named<M: Model> {
 
 impl<M: Model> Default for Named<M> {
     fn default() -> Self {
-        Self { instance: Instance::new(), table: Table::new::<M>() }
+        Self::with_interface(Interface::CoSimulation)
     }
 }
 
 impl<M: Model> Named<M> {
+    /// An instance used in one of the ways of FMI.
+    #[must_use]
+    pub fn with_interface(interface: Interface) -> Self {
+        Self { instance: Instance::with_interface(interface), table: Table::new::<M>() }
+    }
+
     /// The variables in the order of their value references.
     #[must_use]
     pub fn table(&self) -> &Table {
@@ -59,6 +65,41 @@ impl<M: Model> Named<M> {
     pub fn initialize(&mut self) -> Result<(), Fault> {
         self.instance.enter_initialization(0.0, None)?;
         self.instance.exit_initialization()
+    }
+
+    /// One step from where the instance stands.
+    ///
+    /// # Errors
+    /// As [`Instance::do_step`].
+    pub fn step(&mut self, h: f64) -> Result<bool, Fault> {
+        self.instance.do_step(self.instance.time(), h)
+    }
+
+    /// Through Event Mode, with whatever updates it asks for, to where steps are done.
+    ///
+    /// # Errors
+    /// As the functions of Event Mode.
+    pub fn pass_event_mode(&mut self, interface: Interface) -> Result<(), Fault> {
+        while self.instance.update_discrete_states()?.again {}
+        match interface {
+            Interface::ModelExchange => self.instance.enter_continuous_time_mode(),
+            _ => self.instance.enter_step_mode(),
+        }
+    }
+
+    /// All values of the list that are Float64.
+    ///
+    /// # Errors
+    /// As [`Instance::get_float64`].
+    pub fn everything(&mut self) -> Result<Vec<f64>, Fault> {
+        let references: Vec<_> = (0_u32..)
+            .zip(self.table.variables())
+            .filter(|(_, v)| v.entry.kind == Kind::Float64)
+            .map(|(i, _)| i)
+            .collect();
+        let mut values = vec![0.0; references.len()];
+        self.instance.get_float64(&references, &mut values)?;
+        Ok(values)
     }
 }
 
