@@ -389,6 +389,15 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
+    /// The stored value of a variable, computed or not.
+    ///
+    /// # Panics
+    /// If there is no such variable.
+    #[must_use]
+    pub fn raw(&self, reference: u32) -> f64 {
+        self.state.values[reference as usize]
+    }
+
     /// Where the instance stands [s].
     #[must_use]
     pub fn time(&self) -> f64 {

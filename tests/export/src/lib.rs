@@ -1,5 +1,7 @@
 //! What the tests share: an instance addressed by names.
 
+pub mod sparsity;
+
 use fmu_export::{Fault, Instance, Interface, Table};
 use model::{Kind, Model};
 
@@ -46,6 +48,12 @@ impl<M: Model> Named<M> {
     /// As [`Instance::set`].
     pub fn set(&mut self, name: &str, value: f64) -> Result<(), Fault> {
         self.instance.set(&[self.reference(name)], "test", |_: Kind| true, |_| value)
+    }
+
+    /// Start value in the table as set so far, before initialisation.
+    #[must_use]
+    pub fn start(&self, name: &str) -> f64 {
+        self.instance.raw(self.reference(name))
     }
 
     /// Read a Float64 variable.

@@ -10,8 +10,8 @@ use model::{
 };
 
 use super::element::field;
-use super::linkage::{Held, Linkage, PlanarRod, check_plane, plane, world};
-use super::variables::{Energy, Slot};
+use super::linkage::{Energy, Held, Linkage, PlanarRod, check_plane, plane, world};
+use super::variables::Slot;
 
 /// A rod of given length.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
@@ -58,30 +58,35 @@ pub struct Inputs<S> {
     pub C: Slot<S>,
 }
 
+// What depends on what: inputs and states by name or prefix.
+const TIP: &[&str] = &["upper.angle", "lower.angle"];
+const STATES: &[&str] = &["upper", "lower"];
+const ALL: &[&str] = &["C.F.x", "C.F.z", "C.M.xx", "C.M.xz", "C.M.zz", "upper", "lower"];
+
 /// Angles and points; angles are absolute and not wrapped.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
 #[variables(output)]
 pub struct Motion<S> {
     /// Angle of the upper rod, A to B [rad]
-    #[var(name = "upper.angle.theta", exact, start = -1.2)]
+    #[var(name = "upper.angle.theta", state, rate_depends = ["upper.angle_rate.theta"], exact, start = -1.2)]
     pub upper: S,
     /// Rate of the upper rod [rad/s]
-    #[var(name = "upper.angle_rate.theta", exact)]
+    #[var(name = "upper.angle_rate.theta", state, rate_depends = ALL, exact)]
     pub upper_rate: S,
     /// Angle of the lower rod, B to C [rad]
-    #[var(name = "lower.angle.theta", exact, start = -1.0)]
+    #[var(name = "lower.angle.theta", state, rate_depends = ["lower.angle_rate.theta"], exact, start = -1.0)]
     pub lower: S,
     /// Rate of the lower rod [rad/s]
-    #[var(name = "lower.angle_rate.theta", exact)]
+    #[var(name = "lower.angle_rate.theta", state, rate_depends = ALL, exact)]
     pub lower_rate: S,
     /// Position of the joint between the rods [m]
-    #[var(name = "B.r")]
+    #[var(name = "B.r", depends = [["upper.angle"], [], ["upper.angle"]])]
     pub B_r: Vector3<S>,
     /// Position of the tip [m]
-    #[var(name = "C.r")]
+    #[var(name = "C.r", depends = [TIP, [], TIP])]
     pub C_r: Vector3<S>,
     /// Velocity of the tip [m/s]
-    #[var(name = "C.v")]
+    #[var(name = "C.v", depends = [STATES, [], STATES])]
     pub C_v: Vector3<S>,
 }
 
@@ -90,13 +95,13 @@ pub struct Motion<S> {
 #[variables(output)]
 pub struct Dynamics<S> {
     /// Acceleration of the tip [m/s2]
-    #[var(name = "C.a", depends = ["C.F", "C.M"])]
+    #[var(name = "C.a", depends = [ALL, [], ALL])]
     pub C_a: Vector3<S>,
     /// Force on the ground by the upper rod [N]
-    #[var(name = "A.F", depends = ["C.F", "C.M"])]
+    #[var(name = "A.F", depends = [ALL, [], ALL])]
     pub A_F: Vector3<S>,
     /// Force on the upper rod by the lower rod [N]
-    #[var(name = "B.F", depends = ["C.F", "C.M"])]
+    #[var(name = "B.F", depends = [ALL, [], ALL])]
     pub B_F: Vector3<S>,
 }
 

@@ -18,9 +18,9 @@ use model::{
 
 use super::double_wishbone::{magnitude, refused};
 use super::element::field;
-use super::linkage::{Held, Linkage, PlanarRod, check_plane, length, plane, world};
+use super::linkage::{Energy, Held, Linkage, PlanarRod, check_plane, length, plane, world};
 use super::parameters::StabilisationKind;
-use super::variables::{Energy, Slot};
+use super::variables::Slot;
 
 /// Parameters of the four-bar linkage. Defaults: the Grashof crank-rocker of the reference.
 #[derive(Debug, Clone, PartialEq, Variables)]
@@ -82,45 +82,64 @@ pub struct Inputs<S> {
     pub torque: S,
 }
 
+// What depends on what: inputs and states by name or prefix.
+const OUTER: &[&str] = &["crank.angle", "coupler.angle"];
+const OUTER_RATE: &[&str] = &["crank.angle", "crank.angle_rate", "coupler"];
+const GAP: &[&str] = &["crank.angle", "coupler.angle", "rocker.angle"];
+const GAP_RATE: &[&str] = &["crank.angle", "crank.angle_rate", "coupler", "rocker"];
+const MOBILITY: &[&str] = &["P.M.xx", "P.M.xz", "P.M.zz", "crank.angle", "coupler.angle", "rocker.angle"];
+const ALL: &[&str] = &[
+    "P.F.x",
+    "P.F.z",
+    "P.M.xx",
+    "P.M.xz",
+    "P.M.zz",
+    "crank.torque",
+    "crank.angle",
+    "crank.angle_rate",
+    "coupler",
+    "rocker",
+];
+
 /// Angles and points; angles are absolute and not wrapped.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
 #[variables(output)]
 pub struct Motion<S> {
     /// Angle of the crank, A to B [rad]
-    #[var(name = "crank.angle.theta")]
+    #[var(name = "crank.angle.theta", state, rate_depends = ["crank.angle_rate.theta"])]
     pub crank: S,
     /// Angle of the coupler, B to C [rad]
-    #[var(name = "coupler.angle.theta")]
+    #[var(name = "coupler.angle.theta", state, rate_depends = ["coupler.angle_rate.theta"])]
     pub coupler: S,
     /// Angle of the rocker, D to C [rad]
-    #[var(name = "rocker.angle.theta")]
+    #[var(name = "rocker.angle.theta", state, rate_depends = ["rocker.angle_rate.theta"])]
     pub rocker: S,
     /// Rate of the crank [rad/s]
-    #[var(name = "crank.angle_rate.theta", exact, start = 6.0)]
+    #[var(name = "crank.angle_rate.theta", state, rate_depends = ALL, exact, start = 6.0)]
     pub crank_rate: S,
     /// Rate of the coupler [rad/s]
-    #[var(name = "coupler.angle_rate.theta")]
+    #[var(name = "coupler.angle_rate.theta", state, rate_depends = ALL)]
     pub coupler_rate: S,
     /// Rate of the rocker [rad/s]
-    #[var(name = "rocker.angle_rate.theta")]
+    #[var(name = "rocker.angle_rate.theta", state, rate_depends = ALL)]
     pub rocker_rate: S,
     /// Position of the coupler point P [m]
-    #[var(name = "P.r")]
+    #[var(name = "P.r", depends = [OUTER, [], OUTER])]
     pub P_r: Vector3<S>,
     /// Velocity of the coupler point P [m/s]
-    #[var(name = "P.v")]
+    #[var(name = "P.v", depends = [OUTER_RATE, [], OUTER_RATE])]
     pub P_v: Vector3<S>,
     /// Position of the joint crank - coupler [m]
-    #[var(name = "B.r")]
+    #[var(name = "B.r", depends = [["crank.angle"], [], ["crank.angle"]])]
     pub B_r: Vector3<S>,
     /// Position of the joint coupler - rocker, on the coupler [m]
-    #[var(name = "C.r")]
+    #[var(name = "C.r", depends = [OUTER, [], OUTER])]
     pub C_r: Vector3<S>,
     /// Distance of the two sides of the closed joint [m]
-    #[var(name = "loop.gap", nominal = 1e-6)]
+    #[var(name = "loop.gap", nominal = 1e-6, depends = GAP)]
     pub gap: S,
     /// Relative speed of the two sides of the closed joint [m/s]
-    #[var(name = "loop.gap_rate", nominal = 1e-6)]
+    #[var(name = "loop.gap_rate", nominal = 1e-6, depends = GAP_RATE)]
     pub gap_rate: S,
 }
 
@@ -129,22 +148,22 @@ pub struct Motion<S> {
 #[variables(output)]
 pub struct Dynamics<S> {
     /// Acceleration of the coupler point P [m/s2]
-    #[var(name = "P.a", depends = ["P.F", "P.M", "crank.torque"])]
+    #[var(name = "P.a", depends = [ALL, [], ALL])]
     pub P_a: Vector3<S>,
     /// Force on the ground by the crank [N]
-    #[var(name = "A.F", depends = ["P.F", "P.M", "crank.torque"])]
+    #[var(name = "A.F", depends = [ALL, [], ALL])]
     pub A_F: Vector3<S>,
     /// Force on the ground by the rocker [N]
-    #[var(name = "D.F", depends = ["P.F", "P.M", "crank.torque"])]
+    #[var(name = "D.F", depends = [ALL, [], ALL])]
     pub D_F: Vector3<S>,
     /// Force on the crank by the coupler [N]
-    #[var(name = "B.F", depends = ["P.F", "P.M", "crank.torque"])]
+    #[var(name = "B.F", depends = [ALL, [], ALL])]
     pub B_F: Vector3<S>,
     /// Force on the coupler by the rocker [N]
-    #[var(name = "C.F", depends = ["P.F", "P.M", "crank.torque"])]
+    #[var(name = "C.F", depends = [ALL, [], ALL])]
     pub C_F: Vector3<S>,
     /// Condition of the loop closure (18), largest over smallest kept eigenvalue
-    #[var(name = "loop.condition", depends = ["P.M"])]
+    #[var(name = "loop.condition", depends = MOBILITY)]
     pub condition: S,
 }
 

@@ -65,36 +65,55 @@ pub struct Inputs<S> {
     pub torque: Vector3<S>,
 }
 
+// What depends on what: inputs and states by name, prefix or component (`@`), united over all joint kinds.
+const POINT: &[&str] = &["A.r.@", "angle", "direction", "orientation.q"];
+const HEIGHT: &[&str] = &["A.r.z", "angle.theta", "direction", "orientation.q"];
+const ALONG: &[&str] = &["A.v.x", "angle", "angle_rate", "direction", "orientation.q", "omega.y", "omega.z"];
+const ACROSS: &[&str] = &["A.v.y", "angle", "angle_rate", "direction", "orientation.q", "omega.x", "omega.z"];
+const RISE: &[&str] =
+    &["A.v.z", "angle.theta", "angle_rate.theta", "direction", "orientation.q", "omega.x", "omega.y"];
+const BIAS: &[&str] =
+    &["B.F", "B.M", "drive.torque", "angle", "direction", "orientation.q", "angle_rate", "omega"];
+const INERTIA: &[&str] = &["B.M", "angle", "direction", "orientation.q"];
+const ALL: &[&str] =
+    &["A.a", "B.F", "B.M", "drive.torque", "angle", "direction", "orientation.q", "angle_rate", "omega"];
+/// A joint passes no moment in the directions in which it turns freely.
+const MOMENT: &[&str] = &["A.a", "B.F", "B.M", "drive.torque", "angle", "angle_rate", "direction"];
+const MOMENT_Z: &[&str] =
+    &["A.a", "B.F", "B.M", "drive.torque", "angle.theta", "angle_rate.theta", "direction"];
+const ANGLES: &[&str] = &["A.a", "B.F", "B.M", "drive.torque", "angle", "angle_rate"];
+const TURNING: &[&str] = &["A.a", "B.F", "B.M", "drive.torque", "direction", "orientation.q", "omega"];
+
 /// Orientation and tip of a rod; coordinates of joint kinds not in use keep their start values.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
 #[variables(output)]
 pub struct Motion<S> {
     /// Elevation of the rod, A to B [rad]
-    #[var(name = "angle.theta", exact, start = -0.049_958_395_721_942_76)]
+    #[var(name = "angle.theta", state, rate_depends = ["angle_rate.theta"], exact, start = -0.049_958_395_721_942_76)]
     pub theta: S,
     /// Azimuth of the rod; constant with joint.kind revolute [rad]
-    #[var(name = "angle.phi", exact)]
+    #[var(name = "angle.phi", state, rate_depends = ["angle_rate.phi"], exact)]
     pub phi: S,
     /// Rate of the elevation [rad/s]
-    #[var(name = "angle_rate.theta", exact)]
+    #[var(name = "angle_rate.theta", state, rate_depends = ANGLES, exact)]
     pub theta_dot: S,
     /// Rate of the azimuth [rad/s]
-    #[var(name = "angle_rate.phi", exact)]
+    #[var(name = "angle_rate.phi", state, rate_depends = ANGLES, exact)]
     pub phi_dot: S,
     /// Orientation, unit quaternion body to world (w, x, y, z), joint.kind spherical
-    #[var(name = "orientation.q", exact, start = [1.0, 0.0, 0.0, 0.0])]
+    #[var(name = "orientation.q", state, rate_depends = [["orientation.q[2]", "orientation.q[3]", "orientation.q[4]", "omega"], ["orientation.q[1]", "orientation.q[3]", "orientation.q[4]", "omega"], ["orientation.q[1]", "orientation.q[2]", "orientation.q[4]", "omega"], ["orientation.q[1]", "orientation.q[2]", "orientation.q[3]", "omega"]], exact, start = [1.0, 0.0, 0.0, 0.0])]
     pub q: [S; 4],
     /// Unit vector along the rod, joint.kind spherical_rod
-    #[var(name = "direction", exact, start = [1.0, 0.0, 0.0])]
+    #[var(name = "direction", state, rate_depends = [["direction.y", "direction.z", "omega.y", "omega.z"], ["direction.x", "direction.z", "omega.x", "omega.z"], ["direction.x", "direction.y", "omega.x", "omega.y"]], exact, start = [1.0, 0.0, 0.0])]
     pub direction: Vector3<S>,
     /// Angular velocity in the world frame, joint.kind spherical and spherical_rod [rad/s]
-    #[var(name = "omega", exact)]
+    #[var(name = "omega", state, rate_depends = TURNING, exact)]
     pub omega: Vector3<S>,
     /// Position of the tip [m]
-    #[var(name = "B.r", depends = ["A.r.@"])]
+    #[var(name = "B.r", depends = [POINT, POINT, HEIGHT])]
     pub B_r: Vector3<S>,
     /// Velocity of the tip [m/s]
-    #[var(name = "B.v", depends = ["A.v.@"])]
+    #[var(name = "B.v", depends = [ALONG, ACROSS, RISE])]
     pub B_v: Vector3<S>,
     /// Inertia about the first joint axis over the largest one: small near the vertical; 1 for other joints
     #[var(name = "joint.singularity", local)]
@@ -106,10 +125,10 @@ pub struct Motion<S> {
 #[variables(output)]
 pub struct Inertia<S> {
     /// Force on the leader at A.a = 0 [N]
-    #[var(name = "A.F0", nominal = 1e2, depends = ["B.F", "B.M", "drive.torque"])]
+    #[var(name = "A.F0", nominal = 1e2, depends = BIAS)]
     pub F0: Vector3<S>,
     /// Effective inertia behind port A [kg]
-    #[var(name = "A.M", depends = ["B.M"])]
+    #[var(name = "A.M", depends = INERTIA)]
     pub M: SymmetricTensor<S>,
 }
 
@@ -118,13 +137,13 @@ pub struct Inertia<S> {
 #[variables(output)]
 pub struct Dynamics<S> {
     /// Acceleration of the tip [m/s2]
-    #[var(name = "B.a", depends = ["A.a", "B.F", "B.M", "drive.torque"])]
+    #[var(name = "B.a", depends = ALL)]
     pub B_a: Vector3<S>,
     /// Force on the leader (8) [N]
-    #[var(name = "A.F", nominal = 1e2, depends = ["A.a", "B.F", "B.M", "drive.torque"])]
+    #[var(name = "A.F", nominal = 1e2, depends = ALL)]
     pub A_F: Vector3<S>,
     /// Moment that the joint passes to the leader side (9); does no work [N.m]
-    #[var(name = "joint.moment", depends = ["A.a", "B.F", "B.M", "drive.torque"])]
+    #[var(name = "joint.moment", depends = [MOMENT, MOMENT, MOMENT_Z])]
     pub moment: Vector3<S>,
 }
 

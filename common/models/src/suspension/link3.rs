@@ -103,45 +103,83 @@ pub struct Inputs<S> {
     pub P_2: Slot<S>,
 }
 
+// What depends on what: inputs and states by name, prefix or component (`@`), united over all joint kinds.
+const POINT: &[&str] = &["B.r.@", "angle", "orientation.q"];
+const HEIGHT: &[&str] = &["B.r.z", "angle.psi", "angle.theta", "orientation.q"];
+const ALONG: &[&str] = &["B.v.x", "angle", "angle_rate", "orientation.q", "omega.y", "omega.z"];
+const ACROSS: &[&str] = &["B.v.y", "angle", "angle_rate", "orientation.q", "omega.x", "omega.z"];
+const RISE: &[&str] = &[
+    "B.v.z",
+    "angle.psi",
+    "angle.theta",
+    "angle_rate.psi",
+    "angle_rate.theta",
+    "orientation.q",
+    "omega.x",
+    "omega.y",
+];
+const BIAS: &[&str] =
+    &["C.F", "C.M", "P.F", "P.M", "P.slot[2]", "angle", "orientation.q", "angle_rate", "omega"];
+const INERTIA: &[&str] = &["C.M", "P.M", "P.slot[2].M", "angle", "orientation.q"];
+const ALL: &[&str] =
+    &["B.a", "C.F", "C.M", "P.F", "P.M", "P.slot[2]", "angle", "orientation.q", "angle_rate", "omega"];
+/// A joint passes no moment in the directions in which it turns freely.
+const MOMENT: &[&str] = &["B.a", "C.F", "C.M", "P.F", "P.M", "P.slot[2]", "angle", "angle_rate"];
+const MOMENT_Z: &[&str] = &["B.a", "C.F", "C.M", "P.F", "P.M", "P.slot[2]", "angle.psi", "angle_rate.psi"];
+const HINGE: &[&str] = &["B.a", "C.F", "C.M", "P.F", "P.M", "P.slot[2]", "angle.psi", "angle_rate.psi"];
+const CARDAN: &[&str] = &[
+    "B.a",
+    "C.F",
+    "C.M",
+    "P.F",
+    "P.M",
+    "P.slot[2]",
+    "angle.phi",
+    "angle.theta",
+    "angle_rate.phi",
+    "angle_rate.theta",
+];
+const BALL: &[&str] = &["B.a", "C.F", "C.M", "P.F", "P.M", "P.slot[2]", "orientation.q", "omega"];
+
 /// Orientation and points of the carrier; coordinates of joint kinds not in use keep their start values.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
 #[variables(output)]
 pub struct Motion<S> {
     /// Rotation from the design position about -y, joint.kind planar and revolute [rad]
-    #[var(name = "angle.psi", exact)]
+    #[var(name = "angle.psi", state, rate_depends = ["angle_rate.psi"], exact)]
     pub psi: S,
     /// Azimuth, joint.kind universal; the azimuth of the hinge with revolute [rad]
-    #[var(name = "angle.phi", exact)]
+    #[var(name = "angle.phi", state, rate_depends = ["angle_rate.phi"], exact)]
     pub phi: S,
     /// Elevation, joint.kind universal [rad]
-    #[var(name = "angle.theta", exact)]
+    #[var(name = "angle.theta", state, rate_depends = ["angle_rate.theta"], exact)]
     pub theta: S,
     /// Rate of psi [rad/s]
-    #[var(name = "angle_rate.psi", exact)]
+    #[var(name = "angle_rate.psi", state, rate_depends = HINGE, exact)]
     pub psi_dot: S,
     /// Rate of the azimuth [rad/s]
-    #[var(name = "angle_rate.phi", exact)]
+    #[var(name = "angle_rate.phi", state, rate_depends = CARDAN, exact)]
     pub phi_dot: S,
     /// Rate of the elevation [rad/s]
-    #[var(name = "angle_rate.theta", exact)]
+    #[var(name = "angle_rate.theta", state, rate_depends = CARDAN, exact)]
     pub theta_dot: S,
     /// Orientation, unit quaternion body to world (w, x, y, z), joint.kind spherical
-    #[var(name = "orientation.q", exact, start = [1.0, 0.0, 0.0, 0.0])]
+    #[var(name = "orientation.q", state, rate_depends = [["orientation.q[2]", "orientation.q[3]", "orientation.q[4]", "omega"], ["orientation.q[1]", "orientation.q[3]", "orientation.q[4]", "omega"], ["orientation.q[1]", "orientation.q[2]", "orientation.q[4]", "omega"], ["orientation.q[1]", "orientation.q[2]", "orientation.q[3]", "omega"]], exact, start = [1.0, 0.0, 0.0, 0.0])]
     pub q: [S; 4],
     /// Angular velocity in the world frame, joint.kind spherical [rad/s]
-    #[var(name = "omega", exact)]
+    #[var(name = "omega", state, rate_depends = BALL, exact)]
     pub omega: Vector3<S>,
     /// Position of C [m]
-    #[var(name = "C.r", depends = ["B.r.@"])]
+    #[var(name = "C.r", depends = [POINT, POINT, HEIGHT])]
     pub C_r: Vector3<S>,
     /// Velocity of C [m/s]
-    #[var(name = "C.v", depends = ["B.v.@"])]
+    #[var(name = "C.v", depends = [ALONG, ACROSS, RISE])]
     pub C_v: Vector3<S>,
     /// Position of the force point P [m]
-    #[var(name = "P.r", depends = ["B.r.@"])]
+    #[var(name = "P.r", depends = [POINT, POINT, HEIGHT])]
     pub P_r: Vector3<S>,
     /// Velocity of the force point P [m/s]
-    #[var(name = "P.v", depends = ["B.v.@"])]
+    #[var(name = "P.v", depends = [ALONG, ACROSS, RISE])]
     pub P_v: Vector3<S>,
     /// Inertia about the first joint axis over the largest one, joint.kind universal; 1 for other joints
     #[var(name = "joint.singularity", local)]
@@ -153,10 +191,10 @@ pub struct Motion<S> {
 #[variables(output)]
 pub struct Inertia<S> {
     /// Force on the leader at B.a = 0 [N]
-    #[var(name = "B.F0", nominal = 1e2, depends = ["C.F", "C.M", "P.F", "P.M", "P.slot[2]"])]
+    #[var(name = "B.F0", nominal = 1e2, depends = BIAS)]
     pub F0: Vector3<S>,
     /// Effective inertia behind port B [kg]
-    #[var(name = "B.M", depends = ["C.M", "P.M", "P.slot[2].M"])]
+    #[var(name = "B.M", depends = INERTIA)]
     pub M: SymmetricTensor<S>,
 }
 
@@ -165,16 +203,16 @@ pub struct Inertia<S> {
 #[variables(output)]
 pub struct Dynamics<S> {
     /// Acceleration of C [m/s2]
-    #[var(name = "C.a", depends = ["B.a", "C.F", "C.M", "P.F", "P.M", "P.slot[2]"])]
+    #[var(name = "C.a", depends = ALL)]
     pub C_a: Vector3<S>,
     /// Acceleration of the force point P [m/s2]
-    #[var(name = "P.a", depends = ["B.a", "C.F", "C.M", "P.F", "P.M", "P.slot[2]"])]
+    #[var(name = "P.a", depends = ALL)]
     pub P_a: Vector3<S>,
     /// Force on the leader (8) [N]
-    #[var(name = "B.F", nominal = 1e2, depends = ["B.a", "C.F", "C.M", "P.F", "P.M", "P.slot[2]"])]
+    #[var(name = "B.F", nominal = 1e2, depends = ALL)]
     pub B_F: Vector3<S>,
     /// Moment that the joint passes to the leader side (9); does no work [N.m]
-    #[var(name = "joint.moment", depends = ["B.a", "C.F", "C.M", "P.F", "P.M", "P.slot[2]"])]
+    #[var(name = "joint.moment", depends = [MOMENT, MOMENT, MOMENT_Z])]
     pub moment: Vector3<S>,
 }
 

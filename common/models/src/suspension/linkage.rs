@@ -49,6 +49,48 @@ impl PlanarRod {
     }
 }
 
+/// What the work on a linkage depends on.
+const WORK: &[&str] = &[
+    "P.F.x",
+    "P.F.z",
+    "P.M.xx",
+    "P.M.xz",
+    "P.M.zz",
+    "C.F.x",
+    "C.F.z",
+    "C.M.xx",
+    "C.M.xz",
+    "C.M.zz",
+    "crank.torque",
+    "crank.angle",
+    "crank.angle_rate",
+    "coupler",
+    "rocker",
+    "upper",
+    "lower",
+];
+
+/// Energies of a linkage (21).
+#[derive(Debug, Clone, Copy, PartialEq, Variables)]
+#[variables(output)]
+pub struct Energy<S> {
+    /// Kinetic energy [J]
+    #[var(name = "energy.kinetic", depends = ["crank.angle", "crank.angle_rate", "coupler", "rocker.angle_rate", "upper", "lower"])]
+    pub kinetic: S,
+    /// Potential energy of gravity [J]
+    #[var(name = "energy.potential", depends = ["crank.angle", "coupler.angle", "rocker.angle", "upper.angle", "lower.angle"])]
+    pub potential: S,
+    /// Energy turned into heat since the start: none [J]
+    #[var(name = "energy.dissipated", state)]
+    pub dissipated: S,
+    /// Work of load and torque since the start [J]
+    #[var(name = "energy.supplied", state, rate_depends = WORK)]
+    pub supplied: S,
+    /// Work through the port since the start [J]
+    #[var(name = "energy.port", state, rate_depends = WORK)]
+    pub port: S,
+}
+
 /// How drift of the closing joint is held.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Held {

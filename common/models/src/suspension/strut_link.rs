@@ -19,7 +19,7 @@ use super::coordinates::{Coordinates, Orientation};
 use super::double_wishbone::refused;
 use super::element::{Element, LoadAt, PosedOf, element_functions, field, restricted, tensor};
 use super::rod::{RodParameters, Turning};
-use super::variables::{ElementEnergy as Energy, Root, Slot};
+use super::variables::{Root, Slot};
 use super::wishbone::span;
 
 /// Joint of the strut link at its root
@@ -112,42 +112,57 @@ pub struct Inputs<S> {
     pub C: Slot<S>,
 }
 
+// What depends on what: inputs and states by name, prefix or component (`@`), united over all joint kinds.
+const POINT: &[&str] = &["D.r.@", "angle.theta", "orientation.q"];
+const ALONG: &[&str] = &["D.v.x", "angle.theta", "angle_rate.theta", "orientation.q", "omega.y", "omega.z"];
+const ACROSS: &[&str] = &["D.v.y", "angle.theta", "angle_rate.theta", "orientation.q", "omega.x", "omega.z"];
+const RISE: &[&str] = &["D.v.z", "angle.theta", "angle_rate.theta", "orientation.q", "omega.x", "omega.y"];
+const SPAN: &[&str] = &["D.r", "T.r", "angle.theta", "orientation.q"];
+const STRUT: &[&str] =
+    &["D.r", "D.v", "T.r", "T.v", "angle.theta", "orientation.q", "angle_rate.theta", "omega"];
+const BIAS: &[&str] =
+    &["C.F", "C.M", "D.r", "D.v", "T.r", "T.v", "angle.theta", "orientation.q", "angle_rate.theta", "omega"];
+const INERTIA: &[&str] = &["C.M", "angle.theta", "orientation.q"];
+const ALL: &[&str] = &["D", "T", "C.F", "C.M", "angle.theta", "orientation.q", "angle_rate.theta", "omega"];
+const HINGE: &[&str] = &["D", "T", "C.F", "C.M", "angle.theta", "angle_rate.theta"];
+const BALL: &[&str] = &["D", "T", "C.F", "C.M", "orientation.q", "omega"];
+
 /// Orientation, tip and strut; coordinates of joint kinds not in use keep their start values.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
 #[variables(output)]
 pub struct Motion<S> {
     /// Elevation of the link, D to C [rad]
-    #[var(name = "angle.theta", exact, start = 0.071_307_464_785_290_4)]
+    #[var(name = "angle.theta", state, rate_depends = ["angle_rate.theta"], exact, start = 0.071_307_464_785_290_4)]
     pub theta: S,
     /// Azimuth of the rod; constant with joint.kind revolute [rad]
     #[var(name = "angle.phi", exact)]
     pub phi: S,
     /// Rate of the elevation [rad/s]
-    #[var(name = "angle_rate.theta", exact)]
+    #[var(name = "angle_rate.theta", state, rate_depends = HINGE, exact)]
     pub theta_dot: S,
     /// Rate of the azimuth [rad/s]
     #[var(name = "angle_rate.phi", exact)]
     pub phi_dot: S,
     /// Orientation, unit quaternion body to world (w, x, y, z), joint.kind spherical
-    #[var(name = "orientation.q", exact, start = [1.0, 0.0, 0.0, 0.0])]
+    #[var(name = "orientation.q", state, rate_depends = [["orientation.q[2]", "orientation.q[3]", "orientation.q[4]", "omega"], ["orientation.q[1]", "orientation.q[3]", "orientation.q[4]", "omega"], ["orientation.q[1]", "orientation.q[2]", "orientation.q[4]", "omega"], ["orientation.q[1]", "orientation.q[2]", "orientation.q[3]", "omega"]], exact, start = [1.0, 0.0, 0.0, 0.0])]
     pub q: [S; 4],
     /// Angular velocity in the world frame, joint.kind spherical [rad/s]
-    #[var(name = "omega", exact)]
+    #[var(name = "omega", state, rate_depends = BALL, exact)]
     pub omega: Vector3<S>,
     /// Position of the tip [m]
-    #[var(name = "C.r", depends = ["D.r.@"])]
+    #[var(name = "C.r", depends = POINT)]
     pub C_r: Vector3<S>,
     /// Velocity of the tip [m/s]
-    #[var(name = "C.v", depends = ["D.v.@"])]
+    #[var(name = "C.v", depends = [ALONG, ACROSS, RISE])]
     pub C_v: Vector3<S>,
     /// Length of the strut [m]
-    #[var(name = "strut.length", depends = ["D.r", "T.r"])]
+    #[var(name = "strut.length", depends = SPAN)]
     pub length: S,
     /// Rate of the strut's length [m/s]
-    #[var(name = "strut.rate", depends = ["D.r", "D.v", "T.r", "T.v"])]
+    #[var(name = "strut.rate", depends = STRUT)]
     pub rate: S,
     /// Tension of the strut (16) [N]
-    #[var(name = "strut.force", nominal = 1e3, depends = ["D.r", "D.v", "T.r", "T.v"])]
+    #[var(name = "strut.force", nominal = 1e3, depends = STRUT)]
     pub force: S,
 }
 
@@ -156,13 +171,13 @@ pub struct Motion<S> {
 #[variables(output)]
 pub struct Inertia<S> {
     /// Force on the leader at D.a = 0 [N]
-    #[var(name = "D.F0", nominal = 1e2, depends = ["D.r", "D.v", "T.r", "T.v", "C.F", "C.M"])]
+    #[var(name = "D.F0", nominal = 1e2, depends = BIAS)]
     pub F0: Vector3<S>,
     /// Effective inertia behind port D [kg]
-    #[var(name = "D.M", depends = ["C.M"])]
+    #[var(name = "D.M", depends = INERTIA)]
     pub M: SymmetricTensor<S>,
     /// Force on the chassis by the strut; the same as T.F [N]
-    #[var(name = "T.F0", nominal = 1e2, depends = ["D.r", "D.v", "T.r", "T.v"])]
+    #[var(name = "T.F0", nominal = 1e2, depends = STRUT)]
     pub T_F0: Vector3<S>,
     /// Inertia behind port T: always zero [kg]
     #[var(name = "T.M")]
@@ -174,17 +189,38 @@ pub struct Inertia<S> {
 #[variables(output)]
 pub struct Dynamics<S> {
     /// Acceleration of the tip [m/s2]
-    #[var(name = "C.a", depends = ["D", "T", "C.F", "C.M"])]
+    #[var(name = "C.a", depends = ALL)]
     pub C_a: Vector3<S>,
     /// Force on the leader (8) [N]
-    #[var(name = "D.F", nominal = 1e2, depends = ["D", "T", "C.F", "C.M"])]
+    #[var(name = "D.F", nominal = 1e2, depends = ALL)]
     pub D_F: Vector3<S>,
     /// Force on the chassis by the strut [N]
-    #[var(name = "T.F", nominal = 1e2, depends = ["D.r", "D.v", "T.r", "T.v"])]
+    #[var(name = "T.F", nominal = 1e2, depends = STRUT)]
     pub T_F: Vector3<S>,
     /// Moment that the joint passes to the leader side (9); does no work [N.m]
-    #[var(name = "joint.moment", depends = ["D", "T", "C.F", "C.M"])]
+    #[var(name = "joint.moment", depends = HINGE)]
     pub moment: Vector3<S>,
+}
+
+/// Energies (21), on a moving root and chassis point.
+#[derive(Debug, Clone, Copy, PartialEq, Variables)]
+#[variables(output)]
+pub struct Energy<S> {
+    /// Kinetic energy [J]
+    #[var(name = "energy.kinetic", depends = ["D.v", "angle.theta", "angle_rate.theta", "orientation.q", "omega"])]
+    pub kinetic: S,
+    /// Potential energy of gravity and spring [J]
+    #[var(name = "energy.potential", depends = SPAN)]
+    pub potential: S,
+    /// Energy turned into heat by the damper since the start [J]
+    #[var(name = "energy.dissipated", state, rate_depends = STRUT)]
+    pub dissipated: S,
+    /// Work of all loads, of root and chassis point on the element since the start [J]
+    #[var(name = "energy.supplied", state, rate_depends = ALL)]
+    pub supplied: S,
+    /// Work through the ports since the start [J]
+    #[var(name = "energy.port", state, rate_depends = ALL)]
+    pub port: S,
 }
 
 /// A rod with a strut.

@@ -311,23 +311,44 @@ pub struct Energy<S> {
     pub port: S,
 }
 
-/// Energies of an element on a moving root; the root port is A, B or D.
+/// What the work on an element depends on.
+const WORK: &[&str] = &[
+    "A.a",
+    "A.v",
+    "B.a",
+    "B.v",
+    "B.F",
+    "B.M",
+    "C.F",
+    "C.M",
+    "P.F",
+    "P.M",
+    "P.slot[2]",
+    "drive.torque",
+    "angle",
+    "angle_rate",
+    "direction",
+    "orientation.q",
+    "omega",
+];
+
+/// Energies of an element on a moving root; the root port is A (`link2`) or B (`link3`).
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
 #[variables(output)]
 pub struct ElementEnergy<S> {
     /// Kinetic energy [J]
-    #[var(name = "energy.kinetic", depends = ["A.v", "B.v", "D.v"])]
+    #[var(name = "energy.kinetic", depends = ["A.v", "B.v", "angle", "angle_rate", "direction", "orientation.q", "omega"])]
     pub kinetic: S,
-    /// Potential energy of gravity and spring [J]
-    #[var(name = "energy.potential", depends = ["A.r", "B.r", "D.r", "T.r"])]
+    /// Potential energy of gravity [J]
+    #[var(name = "energy.potential", depends = ["A.r", "B.r", "angle", "direction", "orientation.q"])]
     pub potential: S,
-    /// Energy turned into heat by the damper since the start [J]
-    #[var(name = "energy.dissipated")]
+    /// Energy turned into heat since the start: none [J]
+    #[var(name = "energy.dissipated", state)]
     pub dissipated: S,
     /// Work of all loads, of the root and of the drive on the element since the start [J]
-    #[var(name = "energy.supplied")]
+    #[var(name = "energy.supplied", state, rate_depends = WORK)]
     pub supplied: S,
     /// Work through the ports since the start [J]
-    #[var(name = "energy.port")]
+    #[var(name = "energy.port", state, rate_depends = WORK)]
     pub port: S,
 }
