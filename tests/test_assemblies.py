@@ -192,9 +192,11 @@ def turning(phi, theta, phi_dot, theta_dot):
 
 def spherical_rod(phi, theta, phi_dot, theta_dot):
     start = dict(zip([f"direction.{i}" for i in AXES], direction(phi, theta)))
-    return start | dict(zip([f"omega.{i}" for i in AXES], turning(phi, theta, phi_dot, theta_dot))) | {
-        "joint.kind": "spherical_rod"
-    }
+    return (
+        start
+        | dict(zip([f"omega.{i}" for i in AXES], turning(phi, theta, phi_dot, theta_dot)))
+        | {"joint.kind": "spherical_rod"}
+    )
 
 
 def spherical(phi, theta, phi_dot, theta_dot):
@@ -202,9 +204,11 @@ def spherical(phi, theta, phi_dot, theta_dot):
     # about z by phi, then about -y by theta
     q = [cp * ct, sp * st, -cp * st, sp * ct]
     start = {f"orientation.q[{i + 1}]": q[i] for i in range(4)}
-    return start | dict(zip([f"omega.{i}" for i in AXES], turning(phi, theta, phi_dot, theta_dot))) | {
-        "joint.kind": "spherical"
-    }
+    return (
+        start
+        | dict(zip([f"omega.{i}" for i in AXES], turning(phi, theta, phi_dot, theta_dot)))
+        | {"joint.kind": "spherical"}
+    )
 
 
 @pytest.mark.parametrize("Ixx", [1e-5, 2e-3, 2e-2])
@@ -213,7 +217,8 @@ def test_rod_without_spin_is_a_rigid_body_on_a_ball_joint(fmu, Ixx):
     integration for any inertia about its axis."""
     at = (0.4, 0.5 * np.pi - 1e-3, 0.3, -0.5)
     runs = [
-        rod(fmu, {**start, "inertia.xx": Ixx}, 2.0, [*TIP, *ENERGIES], rtol=1e-11) for start in (spherical_rod(*at), spherical(*at))
+        rod(fmu, {**start, "inertia.xx": Ixx}, 2.0, [*TIP, *ENERGIES], rtol=1e-11)
+        for start in (spherical_rod(*at), spherical(*at))
     ]
     assert np.ptp(runs[0]["B.r.z"]) > 0.9
     assert max(np.abs(runs[0][name] - runs[1][name]).max() for name in TIP) <= 1e-8
@@ -252,6 +257,9 @@ def test_ball_joint_keeps_the_momentum_about_the_vertical(fmu):
 def test_plane_and_hinged_rods_move_alike(fmu):
     """joint.kind planar, revolute and universal are the same motion in the plane x-z."""
     start = {"angle.theta": 0.4, "angle_rate.theta": -3.0}
-    runs = [rod(fmu, {**start, "joint.kind": kind}, 1.0, [*TIP, "A.F.x", "A.F.z"]) for kind in ("planar", "revolute", "universal")]
+    runs = [
+        rod(fmu, {**start, "joint.kind": kind}, 1.0, [*TIP, "A.F.x", "A.F.z"])
+        for kind in ("planar", "revolute", "universal")
+    ]
     for other in runs[1:]:
         assert np.abs(other.values - runs[0].values).max() <= 1e-10 * np.abs(runs[0].values).max()

@@ -63,7 +63,9 @@ def pendulum(link, H, method, stop=STOP, **options):
         rods[1].set({"A.r.x": 1.0})
         states = [one.block(STATES) for one in rods]
         tree = Tree([Node(rods[0], "A"), Node(rods[1], "A", leader=0, port="B")])
-        method(tree, grid(0.0, stop, H), lambda _: samples.append(np.concatenate([s.read() for s in states])), **options)
+        method(
+            tree, grid(0.0, stop, H), lambda _: samples.append(np.concatenate([s.read() for s in states])), **options
+        )
     samples = np.array(samples)[::every]
     samples[:, 0::2] += 0.5 * np.pi
     return samples

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .fmu import Block, Equations, Instance
+from .fmu import Block, Instance
 
 AXES = ("x", "y", "z")
 PAIRS = ("xx", "xy", "xz", "yy", "yz", "zz")
@@ -98,7 +98,10 @@ class Tree:
                     (
                         own,
                         [(part(own.motion_out, k, MOTION), other.motion_in) for k, other in followers],
-                        [(part(own.acceleration_out, k, ACCELERATION), other.acceleration_in) for k, other in followers],
+                        [
+                            (part(own.acceleration_out, k, ACCELERATION), other.acceleration_in)
+                            for k, other in followers
+                        ],
                     )
                 )
                 self._back.append((own.loads, [(part(own.loads, k, LOAD), other.reaction) for k, other in followers]))

@@ -190,9 +190,7 @@ class Element:
         result["port'"] = power
         result["supplied'"] = power + torque @ w
         # kinetic' + potential' by the chain rule
-        result["stored'"] = (
-            self.m * (v_c @ a_c) + w @ (I @ alpha + np.cross(w, I @ w)) - self.m * (g @ v_c)
-        )
+        result["stored'"] = self.m * (v_c @ a_c) + w @ (I @ alpha + np.cross(w, I @ w)) - self.m * (g @ v_c)
         if self.strut is not None:
             result["stored'"] += (self.strut.k * stretch - self.strut.preload) * rate
         return result
