@@ -1,6 +1,6 @@
-"""Load an FMI 3.0 Co-Simulation FMU once and run it with exact inputs.
+"""Load an FMI 3.0 FMU once and run it: Co-Simulation with exact inputs, or its equations by Model Exchange.
 
-Built on fmpy's low-level layer (`fmpy.fmi3.FMU3Slave`). Everything that is called per step goes through buffers that
+Built on fmpy's low-level layer (`fmpy.fmi3.FMU3Slave`, `FMU3Model`). Everything that is called per step goes through buffers that
 are allocated once; numpy looks at the same memory, so no list is built in the loop.
 
     with Fmu(path) as fmu:
@@ -209,6 +209,10 @@ class Fmu:
         """A new instance in state Instantiated."""
         return Instance(self, event_mode, logging, name)
 
+    def equations(self, logging: bool = False, name: str = "instance") -> "Equations":
+        """A new Model Exchange instance in state Instantiated."""
+        return Equations(self, logging, name)
+
     def run(
         self,
         start_values: Mapping[str, Value] | None = None,
@@ -260,26 +264,28 @@ class Fmu:
 
 
 class Block:
-    """Prepared Get and Set of Float64 variables; `values` is the buffer itself, seen by numpy."""
+    """Prepared Get and Set of variables of one type; `values` is the buffer itself, seen by numpy."""
 
-    def __init__(self, instance: "Instance", names: Sequence[str]):
+    def __init__(self, instance: "Instance", names: Sequence[str], type_name: str = "Float64"):
         self.names = list(names)
         n = len(self.names)
         for name in self.names:
-            if instance.fmu.variable(name).type != "Float64":
-                raise TypeError(f"{name} is {instance.fmu.variable(name).type}, not Float64")
+            if instance.fmu.variable(name).type != type_name:
+                raise TypeError(f"{name} is {instance.fmu.variable(name).type}, not {type_name}")
+        suffix, ctype = TYPES[type_name]
+        self._get, self._set = f"fmi3Get{suffix}", f"fmi3Set{suffix}"
         self._instance = instance
         self._references = (fmi3.fmi3ValueReference * n)(
             *[instance.fmu.variable(name).valueReference for name in self.names]
         )
-        self._buffer = (fmi3.fmi3Float64 * n)()
+        self._buffer = (ctype * n)()
         self.values = np.ctypeslib.as_array(self._buffer) if n else np.empty(0)
 
     def read(self) -> np.ndarray:
         """Get; returns the buffer (a view, overwritten by the next read)."""
         n = len(self.names)
         if n:
-            self._instance.check("fmi3GetFloat64", self._references, n, self._buffer, n)
+            self._instance.check(self._get, self._references, n, self._buffer, n)
         return self.values
 
     def write(self, values: Sequence[float] | None = None):
@@ -288,7 +294,7 @@ class Block:
         if values is not None:
             self.values[:] = values
         if n:
-            self._instance.check("fmi3SetFloat64", self._references, n, self._buffer, n)
+            self._instance.check(self._set, self._references, n, self._buffer, n)
 
 
 class Instance:
@@ -297,27 +303,34 @@ class Instance:
     `call` returns status and messages and never raises; `check` raises `FmuError` from Discard upwards.
     """
 
+    INTERFACE = "CoSimulation"
+
     def __init__(self, fmu: Fmu, event_mode: bool = False, logging: bool = False, name: str = "instance"):
         self.fmu = fmu
         self.event_mode = event_mode
         self.messages: list[Message] = []
         self.time: float | None = None
-        self._slave = fmi3.FMU3Slave(
-            guid=fmu.description.instantiationToken,
-            unzipDirectory=str(fmu.folder),
-            modelIdentifier=fmu.description.coSimulation.modelIdentifier,
-            instanceName=name,
+        self._slave = self._open(
+            guid=fmu.description.instantiationToken, unzipDirectory=str(fmu.folder), instanceName=name
         )
         self._component = None
         try:
-            self._slave.instantiate(loggingOn=logging, eventModeUsed=event_mode, logMessage=self._log)
+            self._slave.instantiate(loggingOn=logging, logMessage=self._log, **self._options())
         except Exception as failed:  # fmpy has no narrower class for "no instance"
             self._slave.freeLibrary()
-            raise FmuError(fmu.name, "fmi3InstantiateCoSimulation", Status.ERROR, self.messages) from failed
+            raise FmuError(fmu.name, f"fmi3Instantiate{self.INTERFACE}", Status.ERROR, self.messages) from failed
         self._component = self._slave.component
         # results of doStep and updateDiscreteStates
         self._flags = [fmi3.fmi3Boolean() for _ in range(5)]
         self._last_time = fmi3.fmi3Float64()
+
+    def _open(self, **options):
+        """The library."""
+        return fmi3.FMU3Slave(modelIdentifier=self.fmu.description.coSimulation.modelIdentifier, **options)
+
+    def _options(self) -> dict[str, bool]:
+        """What only this interface is instantiated with."""
+        return {"eventModeUsed": self.event_mode}
 
     def _log(self, _environment, status, category, message):
         self.messages.append(Message(Status(status), (category or b"").decode(), (message or b"").decode()))
@@ -350,9 +363,9 @@ class Instance:
         return Status(status)
 
     # values -------------------------------------------------------------------------------------------------------
-    def block(self, names: Sequence[str]) -> Block:
-        """Prepared access to Float64 variables."""
-        return Block(self, names)
+    def block(self, names: Sequence[str], type_name: str = "Float64") -> Block:
+        """Prepared access to variables of one type."""
+        return Block(self, names, type_name)
 
     def try_set(self, name: str, value: Value) -> Outcome:
         """Set one variable; returns status and messages."""
@@ -417,10 +430,10 @@ class Instance:
                 return
         raise RuntimeError(f"{self.fmu.name}: the event iteration does not end")
 
-    def try_step(self, t: float, H: float) -> Outcome:
-        """doStep; returns status and messages."""
+    def try_step(self, t: float, H: float, final: bool = True) -> Outcome:
+        """doStep; returns status and messages. `final`: no state from before `t` will be restored."""
         flags = [byref(flag) for flag in self._flags[:3]]
-        outcome = self.call("fmi3DoStep", t, H, True, *flags, byref(self._last_time))
+        outcome = self.call("fmi3DoStep", t, H, final, *flags, byref(self._last_time))
         if outcome.status <= Status.WARNING:
             self.time = t + H
         return outcome
@@ -430,11 +443,11 @@ class Instance:
         """lastSuccessfulTime of the last doStep."""
         return self._last_time.value
 
-    def step(self, t: float, H: float):
-        """doStep; raises from Discard upwards."""
+    def step(self, t: float, H: float, final: bool = True):
+        """doStep; raises from Discard upwards. `final`: no state from before `t` will be restored."""
         self.time = t
         flags = [byref(flag) for flag in self._flags[:3]]
-        self.check("fmi3DoStep", t, H, True, *flags, byref(self._last_time))
+        self.check("fmi3DoStep", t, H, final, *flags, byref(self._last_time))
         self.time = t + H
 
     def reset(self):
@@ -525,3 +538,56 @@ class Instance:
             nu,
         )
         return np.array(out)
+
+
+class Equations(Instance):
+    """A Model Exchange instance: `x` and `x_dot` are the buffers of its continuous states and their derivatives."""
+
+    INTERFACE = "ModelExchange"
+
+    def __init__(self, fmu: Fmu, logging: bool = False, name: str = "instance"):
+        if fmu.description.modelExchange is None:
+            raise ValueError(f"{fmu.path.name} has no Model Exchange interface")
+        super().__init__(fmu, True, logging, name)
+        count = c_size_t()
+        self.check("fmi3GetNumberOfContinuousStates", byref(count))
+        self.nx = count.value
+        self._x, self._x_dot = (fmi3.fmi3Float64 * self.nx)(), (fmi3.fmi3Float64 * self.nx)()
+        self.x, self.x_dot = np.ctypeslib.as_array(self._x), np.ctypeslib.as_array(self._x_dot)
+
+    def _open(self, **options):
+        return fmi3.FMU3Model(modelIdentifier=self.fmu.description.modelExchange.modelIdentifier, **options)
+
+    def _options(self):
+        return {}
+
+    def exit_initialisation(self):
+        """Initialization Mode -> Continuous-Time Mode; `x` is read."""
+        self.check("fmi3ExitInitializationMode")
+        self.enter_continuous_time_mode()
+
+    def enter_continuous_time_mode(self):
+        """Event Mode -> Continuous-Time Mode; `x` is read."""
+        self.update_discrete_states()
+        self.check("fmi3EnterContinuousTimeMode")
+        self.check("fmi3GetContinuousStates", self._x, self.nx)
+
+    def set_time(self, t: float):
+        """SetTime."""
+        self.time = t
+        self.check("fmi3SetTime", fmi3.fmi3Float64(t))
+
+    def write_states(self):
+        """Set the states in `x`."""
+        self.check("fmi3SetContinuousStates", self._x, self.nx)
+
+    def read_derivatives(self) -> np.ndarray:
+        """Get the derivatives; returns `x_dot`."""
+        self.check("fmi3GetContinuousStateDerivatives", self._x_dot, self.nx)
+        return self.x_dot
+
+    def completed_step(self, final: bool = True) -> bool:
+        """completedIntegratorStep; true if the FMU asks for Event Mode."""
+        event, terminate = self._flags[:2]
+        self.check("fmi3CompletedIntegratorStep", final, byref(event), byref(terminate))
+        return event.value

@@ -26,6 +26,24 @@ COLUMNS = {
     "w.y": "carrier.omega.y",
     "w.z": "carrier.omega.z",
 }
+#: The same for files of other systems.
+COLUMNS_OF = {
+    "four_bar": {
+        "theta1": "crank.angle.theta",
+        "theta1_dot": "crank.angle_rate.theta",
+        "psi": "coupler.angle.theta",
+        "psi_dot": "coupler.angle_rate.theta",
+        "theta3": "rocker.angle.theta",
+        "theta3_dot": "rocker.angle_rate.theta",
+        "strut.length": None,
+    },
+    "double_pendulum": {
+        "theta1": "upper.angle.theta",
+        "theta1_dot": "upper.angle_rate.theta",
+        "theta2": "lower.angle.theta",
+        "theta2_dot": "lower.angle_rate.theta",
+    },
+}
 #: Columns that the FMU does not offer as a variable.
 WITHOUT_VARIABLE = ("t", "theta1_ddot")
 
@@ -148,7 +166,9 @@ class Reference:
             raise BadReference(f"{self.path.name} holds values that are not finite")
         self.t = self.values[:, 0]
         #: Variable name -> column number.
-        self.variables = {COLUMNS.get(c, c): i for i, c in enumerate(columns) if c not in WITHOUT_VARIABLE}
+        names = COLUMNS_OF.get(self.path.stem, COLUMNS)
+        offered = [(names.get(c, c), i) for i, c in enumerate(columns) if c not in WITHOUT_VARIABLE]
+        self.variables = {name: i for name, i in offered if name is not None}
         parameters = self.path.with_suffix(".json")
         #: Parameters that came with the file.
         self.parameters = json.loads(parameters.read_text(encoding="utf-8")) if parameters.is_file() else {}
