@@ -179,7 +179,6 @@ impl Model for FourBar {
     const NAME: &'static str = "four_bar";
     const DESCRIPTION: &'static str = "Planar four-bar linkage with a leader port on the coupler";
     const EXPERIMENT: Experiment = Experiment { stop: 5.0, step: 0.02 };
-    const MODEL_EXCHANGE: bool = false; // states not marked yet
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;
