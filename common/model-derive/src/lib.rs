@@ -332,8 +332,11 @@ fn expand_variables(input: &DeriveInput) -> syn::Result<Tokens> {
     })
 }
 
-/// `SphericalRod` -> `spherical_rod`.
+/// `SphericalRod` -> `spherical_rod`; a single letter is the name of a point and stays.
 fn snake_case(name: &str) -> String {
+    if name.len() == 1 {
+        return name.to_string();
+    }
     let mut out = String::new();
     for (i, c) in name.char_indices() {
         if c.is_uppercase() && i > 0 {

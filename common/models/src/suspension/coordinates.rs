@@ -112,7 +112,7 @@ pub(super) trait Coordinates<const D: usize, const N: usize>: Joint<D, N> {
 /// One angle, of a carrier or of a link at the azimuth `phi`.
 fn single_angle<S: Scalar>(x: &[S], phi: S, carrier: bool) -> Orientation<S> {
     if carrier {
-        Orientation { psi: x[0], psi_dot: x[1], ..Orientation::unused() }
+        Orientation { psi: x[0], psi_dot: x[1], phi, ..Orientation::unused() }
     } else {
         Orientation { theta: x[0], theta_dot: x[1], phi, ..Orientation::unused() }
     }
