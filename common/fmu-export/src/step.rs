@@ -164,9 +164,10 @@ impl<M: Model> Instance<M> {
             self.see_reset();
         }
         let State { values, given, history, .. } = &mut self.state;
-        let port = PortParameters::load(&values[Layout::<M>::PORT]);
-        let endpoint = port.inputs == InputTreatment::Endpoint;
+        let endpoint = InputTreatment::load(&values[Layout::<M>::PORT]) == InputTreatment::Endpoint;
         let sampled = if endpoint { span.to } else { span.from };
+        let integrate =
+            self.channels.moving() && PortParameters::load(&values[Layout::<M>::PORT]).integrate_motion;
         let u = &mut values[Layout::<M>::INPUTS];
         u.copy_from_slice(given);
         if settled {
@@ -177,7 +178,7 @@ impl<M: Model> Instance<M> {
             return;
         }
         self.polynomials.evaluate(span.to, u);
-        if port.integrate_motion && self.channels.moving() {
+        if integrate {
             // positions and velocities go on from here unless the host sets them
             for i in self.channels.integrated() {
                 given[i] = u[i];

@@ -5,8 +5,8 @@ use export_tests::rod::{EVALUATIONS, Rod};
 use export_tests::{Named, Random};
 use fmu_export::Interface::{CoSimulation, CoSimulationWithEvents};
 use fmu_export::{Fault, Status};
-use model::Causality;
-use models::suspension::DoubleWishbone;
+use model::{Causality, Model};
+use models::suspension::{DoublePendulum, DoubleWishbone, FourBar, Link2, Link3, StrutLink};
 
 /// A run with inputs that change at every communication point, all values as bits.
 fn run(events: bool, treatment: f64, order: f64) -> Vec<Vec<u64>> {
@@ -94,44 +94,64 @@ fn a_sweep_computes_what_is_asked_for_and_changed() {
     assert_eq!(EVALUATIONS.with(std::cell::Cell::get), before);
 }
 
+/// Inputs of a model with values that it can take: start values, moved a little, inertias positive.
+fn input_values<M: Model>(fmu: &Named<M>, random: &mut Random) -> Vec<(String, f64)> {
+    let variables = fmu.table().variables().iter();
+    let diagonal = |name: &str| ["xx", "yy", "zz"].iter().any(|d| name.ends_with(d));
+    variables
+        .filter(|v| v.entry.causality == Causality::Input)
+        .map(|v| {
+            let value = if diagonal(&v.name) { 30.0 } else { v.entry.start + random.between(0.0, 0.1) };
+            (v.name.clone(), value)
+        })
+        .collect()
+}
+
 /// After any sequence of Sets every value is the one of an instance in which all groups are computed
 /// afresh: the declared dependencies, which say what a Set makes stale, cover locals too.
-#[test]
-fn lazy_values_are_fresh_values() {
+fn lazy_values_are_fresh_values<M: Model>(settings: &[&[(&str, f64)]]) {
     let mut random = Random(3);
-    for settings in [&[][..], &[("scene.motion", 2.0), ("use.tie", 1.0), ("stabilisation.kind", 2.0)]] {
-        let mut lazy = Named::<DoubleWishbone>::with_interface(CoSimulationWithEvents);
+    let started = |settings: &[(&str, f64)], inputs: &[(String, f64)]| {
+        let mut fmu = Named::<M>::with_interface(CoSimulationWithEvents);
         for (name, value) in settings {
-            lazy.set(name, *value).expect("setting");
+            fmu.set(name, *value).expect("setting");
         }
-        lazy.initialize().expect("start");
-        let variables = lazy.table().variables().iter();
-        let inputs = variables.filter(|v| v.entry.causality == Causality::Input);
-        let inputs: Vec<_> = inputs.map(|v| v.name.clone()).collect();
-        let diagonal = |name: &&String| ["xx", "yy", "zz"].iter().any(|d| name.ends_with(d));
-        let mut values: Vec<_> = inputs.iter().map(|n| if diagonal(&n) { 30.0 } else { 0.1 }).collect();
-        for (name, value) in inputs.iter().zip(&values) {
-            lazy.set(name, *value).expect("input");
+        for (name, value) in inputs {
+            fmu.set(name, *value).expect("input");
         }
-        for _ in 0..40 {
-            let count = f64::from(u32::try_from(inputs.len()).expect("few"));
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
-            let i = random.between(0.0, count) as usize;
-            values[i] += random.between(0.0, 0.5);
-            lazy.set(&inputs[i], values[i]).expect("input");
-            let got = lazy.everything().expect("values");
-            let mut fresh = Named::<DoubleWishbone>::with_interface(CoSimulationWithEvents);
-            for (name, value) in settings {
-                fresh.set(name, *value).expect("setting");
-            }
-            for (name, value) in inputs.iter().zip(&values) {
-                fresh.set(name, *value).expect("input");
-            }
-            fresh.initialize().expect("start");
+        fmu.initialize().expect("start");
+        fmu
+    };
+    for settings in settings {
+        let mut inputs = input_values(&Named::<M>::default(), &mut random);
+        let mut lazy = started(settings, &inputs);
+        for i in 0..inputs.len() {
+            inputs[i].1 += random.between(0.1, 0.5);
+            lazy.set(&inputs[i].0, inputs[i].1).expect("input");
             let bits = |v: Vec<f64>| v.into_iter().map(f64::to_bits).collect::<Vec<_>>();
-            assert_eq!(bits(got), bits(fresh.everything().expect("values")), "after {}", inputs[i]);
+            let fresh = started(settings, &inputs).everything().expect("values");
+            assert_eq!(bits(lazy.everything().expect("values")), bits(fresh), "{}: {}", M::NAME, inputs[i].0);
         }
     }
+}
+
+#[test]
+fn lazy_values_of_every_model_are_fresh_values() {
+    lazy_values_are_fresh_values::<Rod>(&[&[]]);
+    lazy_values_are_fresh_values::<DoubleWishbone>(&[
+        &[],
+        &[("scene.motion", 2.0), ("use.tie", 1.0), ("stabilisation.kind", 2.0)],
+        &[("scene.motion", 2.0), ("arm.joint", 2.0), ("carrier.joint", 2.0)],
+    ]);
+    let kinds = |n: i32| (1..=n).map(|k| vec![("joint.kind", f64::from(k))]).collect::<Vec<_>>();
+    let of = |kinds: &[Vec<(&'static str, f64)>], run: fn(&[&[(&str, f64)]])| {
+        run(&kinds.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    };
+    of(&kinds(5), lazy_values_are_fresh_values::<Link2>);
+    of(&kinds(4), lazy_values_are_fresh_values::<Link3>);
+    of(&kinds(3), lazy_values_are_fresh_values::<StrutLink>);
+    lazy_values_are_fresh_values::<FourBar>(&[&[]]);
+    lazy_values_are_fresh_values::<DoublePendulum>(&[&[]]);
 }
 
 /// An event at the very end of a step waits for Event Mode, so that inputs of that time count; without
