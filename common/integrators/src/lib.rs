@@ -3,13 +3,21 @@
 //! ```text
 //! x_(n+1) = x_n + h sum_i b_i k_i,   k_i = f(t_n + c_i h, x_n + h sum_j a_ij k_j)
 //! ```
-//! A method is one file with one table of numbers (`heun.rs`, `rk4.rs`, `dopri5.rs`); the two drivers (`fixed.rs`,
-//! `adaptive.rs`) know a method only as the `OneStep` of `one_step.rs`, so an implicit one is a third implementor
-//! beside `explicit.rs`. Nothing here knows a model or FMI, and nothing allocates.
+//! A method is one file with one table of numbers; the two drivers (`fixed.rs`, `adaptive.rs`) know it only as the
+//! `OneStep` of `one_step.rs`. Nothing here knows a model or FMI, and nothing allocates.
 //!
-//! Sources: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. 1993
-//! (methods, step size control, dense output); I. F. D. Oliveira, R. H. C. Takahashi, ACM TOMS 47 (2020) (root
-//! finder). Left out: integration backwards in time, implicit and multistep methods.
+//! | method | order | step | for |
+//! | --- | --- | --- | --- |
+//! | [`Heun`](Method::Heun), [`Rk4`](Method::Rk4) | 2, 4 | fixed | real time, smooth motion |
+//! | [`Dopri5`](Method::Dopri5), [`Dop853`](Method::Dop853) | 5, 8 | adaptive | moderate and high accuracy |
+//! | [`Rodas4`](Method::Rodas4) | 4 | adaptive | stiff, moderate accuracy, no iteration |
+//! | [`Radau5`](Method::Radau5) | 5 | adaptive | stiff, any accuracy |
+//! | [`Exact`](Method::Exact) | exact | fixed | linear systems ([`Ode::linear`]), see [`Transition`] |
+//!
+//! Sources: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. 1993 (methods,
+//! step size control, dense output); E. Hairer, G. Wanner, *II*, 2nd ed. 1996 (stiff methods); I. F. D. Oliveira,
+//! R. H. C. Takahashi, ACM TOMS 47 (2020) (root finder). Left out: integration backwards in time, multistep methods,
+//! sparse matrices.
 //!
 //! ```
 //! use integrators::{Method, Ode, Settings, Solver, Statistics};

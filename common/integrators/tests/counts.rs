@@ -80,6 +80,39 @@ fn dopri5_evaluates_anew_after_a_projection() {
     assert!((x[0].hypot(x[1]) - 1.0).abs() <= f64::EPSILON);
 }
 
+/// Twelve per step with the slope at its start, eleven per trial thrown away, one for the guess of the first step.
+#[test]
+fn dop853_takes_twelve_per_step() {
+    let orbit = Kepler { e: 0.9 };
+    let (mut x, mut s) = (orbit.exact(0.0), Statistics::default());
+    solver(Method::Dop853, 1.0, 1e-8).advance(&orbit, 0.0, 12.0, &mut x, &mut s).expect("smooth");
+    assert!(s.rejected > 0);
+    assert_eq!(s.rhs_evaluations, 1 + 12 * s.steps + 11 * s.rejected);
+    assert_eq!((s.jacobians, s.decompositions), (0, 0));
+}
+
+/// Six per step, five per trial thrown away, which does without a new Jacobian but not without a new matrix.
+#[test]
+fn rodas4_takes_a_jacobian_per_step() {
+    let orbit = Kepler { e: 0.9 };
+    let (mut x, mut s) = (orbit.exact(0.0), Statistics::default());
+    solver(Method::Rodas4, 1.0, 1e-6).advance(&orbit, 0.0, 12.0, &mut x, &mut s).expect("smooth");
+    assert!(s.rejected > 0);
+    assert_eq!(s.rhs_evaluations, 1 + 6 * s.steps + 5 * s.rejected);
+    assert_eq!((s.jacobians, s.decompositions), (s.steps, s.steps + s.rejected));
+}
+
+/// A linear system: the Jacobian stays for the whole call, the iteration is done after one or two rounds of three, and
+/// the matrices stay where the step size does.
+#[test]
+fn radau5_keeps_its_jacobian() {
+    let (ode, s, _) = run(Method::Radau5, false, 1e-8);
+    assert_eq!(ode.evaluations.get(), s.rhs_evaluations);
+    assert_eq!(s.jacobians, 1);
+    assert!(s.decompositions < s.steps, "{s:?}");
+    assert!(s.rhs_evaluations <= 2 + 7 * (s.steps + s.rejected), "{s:?}");
+}
+
 #[test]
 fn projection_is_called_once_per_accepted_step() {
     for method in Method::ALL {

@@ -73,18 +73,38 @@ proptest! {
         }
     }
 
-    /// The adaptive method keeps its tolerance, up to the growth of the system and the number of steps.
+    /// The adaptive methods keep their tolerance, up to the growth of the system and the number of steps.
     #[test]
     fn adaptive_steps_follow_the_matrix_exponential(ode in linear(), x in state(), digits in 4..11_i32) {
         let tolerance = 0.1_f64.powi(digits);
         let norm = ode.a.as_flattened().iter().map(|a| a * a).sum::<f64>().sqrt();
-        let mut end = x;
-        let statistics = advance(&mut solver(Method::Dopri5, 1.0, tolerance), &ode, 0.0, 2.0, &mut end);
-        let scale = (2.0 * norm).exp();
-        let steps = f64::from(u32::try_from(statistics.steps).expect("few steps"));
-        let bound = 2.0 * steps * tolerance * (1.0 + scale) * scale;
-        let error = distance(&end, &ode.exact(2.0, &x));
-        prop_assert!(error <= bound, "{error:e} {bound:e}");
+        for method in GENERAL.into_iter().filter(|m| m.is_adaptive()) {
+            let mut end = x;
+            let statistics = advance(&mut solver(method, 1.0, tolerance), &ode, 0.0, 2.0, &mut end);
+            let scale = (2.0 * norm).exp();
+            let steps = f64::from(u32::try_from(statistics.steps).expect("few steps"));
+            let bound = 2.0 * steps * tolerance * (1.0 + scale) * scale;
+            let error = distance(&end, &ode.exact(2.0, &x));
+            prop_assert!(error <= bound, "{method:?}: {error:e} {bound:e}");
+        }
+    }
+
+    /// `exact` is the closed form, and what RK4 tends to: its distance to RK4 falls with `h^4` to that rounding.
+    #[test]
+    fn exact_is_the_limit_of_small_steps(ode in linear(), x in state(), t_end in 0.1..3.0_f64) {
+        let norm = ode.a.as_flattened().iter().map(|a| a * a).sum::<f64>().sqrt();
+        let end = |method, step| {
+            let mut x = x;
+            advance(&mut solver(method, step, 1.0), &ode, 0.0, t_end, &mut x);
+            x
+        };
+        let scale = (norm * t_end).exp();
+        let exact = end(Method::Exact, 10.0);
+        prop_assert!(distance(&exact, &ode.exact(t_end, &x)) < 1e-13 * scale);
+        prop_assert!(distance(&exact, &end(Method::Exact, 0.07)) < 1e-13 * scale);
+        let h = 0.01;
+        let bound = t_end * norm.powi(5) * h * h * h * h * scale + 1e-12 * scale; // e^(|A| h) / 120 < 1
+        prop_assert!(distance(&exact, &end(Method::Rk4, h)) < bound);
     }
 
     /// A mode that the guard lets pass does not grow by more than it says, for any state.

@@ -43,7 +43,9 @@ fn van_der_pol_ends_where_published() {
                 );
                 let error = relative(&x, &exact);
                 eprintln!("{eps:e} {method:?} {tolerance:.0e}: {error:.2e}, {s:?}");
-                // local errors of one tolerance each, damped but for a shift in time at each of the three jumps
+                // Rodas4: in proportion. Radau5: its estimate of order 3 is held to tolerance^(2/3), so h goes with
+                // tolerance^(1/6) and the error, of order 5, with tolerance^(5/6)
+                let tolerance = if method == Method::Radau5 { tolerance.powf(5.0 / 6.0) } else { tolerance };
                 assert!(error < 30.0 * tolerance, "{eps:e} {method:?} {tolerance:e}: {error:e}");
                 assert!(s.rejected < 20 && s.jacobians <= s.steps + s.rejected);
             }

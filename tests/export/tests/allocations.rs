@@ -38,7 +38,7 @@ fn steps_values_and_derivatives_do_not_allocate() {
         &[("scene.motion", 2.0), ("use.tie", 1.0)],
         &[("closure.kind", 2.0), ("closure.k", 1e5), ("closure.c", 100.0)],
     ] {
-        for method in [1.0, 2.0, 3.0] {
+        for method in [1.0, 2.0, 3.0, 4.0, 5.0, 6.0] {
             let mut fmu = Named::<DoubleWishbone>::default();
             for (name, value) in settings {
                 fmu.set(name, *value).expect("setting");
