@@ -203,7 +203,7 @@ def test_the_triangle_inequality_does_not_matter_in_the_plane(instance):
     instance.step(0.0, 0.1)
 
 
-@pytest.mark.parametrize(("method", "number"), [("dop853", 4), ("rodas4", 5), ("radau5", 6), ("exact", 7)])
+@pytest.mark.parametrize(("method", "number"), [("exact", 7)])
 def test_methods_not_offered_are_refused_with_the_offered_ones(wishbone, instance, method, number):
     set_ = instance.try_set("solver.method", number)
     assert set_.status == Status.OK, set_.text

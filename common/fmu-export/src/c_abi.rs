@@ -529,7 +529,7 @@ pub unsafe fn fmi3SetFloat64<M: Model>(
         call::<M>(instance, &phase::SET_FLOAT64, |c| {
             let (references, values) =
                 (array("valueReferences", references, n)?, array("values", values, n_values)?);
-            crate::instance::same_length(n, n_values)?;
+            crate::values::same_length(n, n_values)?;
             c.instance.set(references, "Float64", |k| k == Kind::Float64, |i| values[i])
         })
     }
@@ -551,7 +551,7 @@ macro_rules! whole_number_access {
                 call::<M>(instance, &phase::$get_rule, |c| {
                     let references = array("valueReferences", references, n)?;
                     let values = array_mut("values", values, n_values)?;
-                    crate::instance::same_length(n, n_values)?;
+                    crate::values::same_length(n, n_values)?;
                     let to: fn(f64) -> $c_type = $to;
                     c.instance.get_whole(references, $called, |k| matches!(k, $is), |i, v| values[i] = to(v))
                 })
@@ -571,7 +571,7 @@ macro_rules! whole_number_access {
                 call::<M>(instance, &phase::$set_rule, |c| {
                     let references = array("valueReferences", references, n)?;
                     let values = array("values", values, n_values)?;
-                    crate::instance::same_length(n, n_values)?;
+                    crate::values::same_length(n, n_values)?;
                     let from: fn($c_type) -> f64 = $from;
                     c.instance.set(references, $called, |k| matches!(k, $is), |i| from(values[i]))
                 })
@@ -724,7 +724,7 @@ pub unsafe fn fmi3GetVariableDependencies<M: Model>(
     unsafe {
         call::<M>(instance, &phase::DEPENDENCIES, |c| {
             let found = c.instance.dependencies(dependent)?;
-            crate::instance::same_length(found.len(), n)?;
+            crate::values::same_length(found.len(), n)?;
             array_mut("elementIndicesOfDependent", elements_of_dependent, n)?.fill(0);
             array_mut("elementIndicesOfIndependents", elements_of_independents, n)?.fill(0);
             array_mut("dependencyKinds", kinds, n)?.fill(DEPENDENT);

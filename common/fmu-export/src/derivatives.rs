@@ -3,11 +3,11 @@
 use model::{Causality, Model};
 use num_dual::Dual64;
 
-use crate::instance::same_length;
 use crate::jobs::{Evaluate, Rates};
 use crate::phase::{Interface, Phase};
 use crate::state::State;
 use crate::table::{ALL_PARTS, Layout, Part, Variable};
+use crate::values::same_length;
 use crate::{Fault, Instance};
 
 impl<M: Model> Instance<M> {

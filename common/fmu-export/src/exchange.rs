@@ -2,11 +2,12 @@
 
 use model::Model;
 
-use crate::instance::{SAME_TIME, same_length};
+use crate::instance::SAME_TIME;
 use crate::jobs::{Astray, Nominals};
 use crate::phase::Phase;
 use crate::state::State;
-use crate::table::{Layout, Part};
+use crate::table::{ALL_PARTS, Layout, Part};
+use crate::values::same_length;
 use crate::{Fault, Instance};
 
 impl<M: Model> Instance<M> {
@@ -80,7 +81,7 @@ impl<M: Model> Instance<M> {
         if self.state.phase == Phase::InitializationMode {
             let of = |acc, state: &usize| acc | self.table.access[*state];
             let parts = self.table.states.iter().fold(0, of);
-            self.refresh(parts & crate::table::ALL_PARTS)?;
+            self.refresh(parts & ALL_PARTS)?;
             for (value, state) in states.iter_mut().zip(&self.table.states) {
                 *value = self.state.values[*state];
             }

@@ -108,9 +108,9 @@ pub enum Fault {
         /// What would be accepted
         allowed: String,
     },
-    /// A method that this version lacks.
+    /// A method for other systems than this one.
     #[error(
-        "solver.method = {name} ({method}) is not offered yet; allowed: heun (1), rk4 (2), dopri5 (3)",
+        "solver.method = {name} ({method}) is for linear systems, this one is not; allowed: heun (1), rk4 (2), dopri5 (3), dop853 (4), rodas4 (5), radau5 (6)",
         name = method_name(*method)
     )]
     MethodNotOffered {

@@ -3,8 +3,10 @@
 use std::cell::RefCell;
 
 use integrators::{
-    Complex, Indicators, Method, Ode, Reached, Solver, Statistics, StepError, largest_stable_step, violates,
+    Complex, Indicators, Jacobian, Method, Ode, Reached, Solver, Statistics, StepError, largest_stable_step,
+    violates,
 };
+use model::Matrix;
 use model::{
     EvaluationError, Group, Model, Outputs, ParameterError, Spectrum, System, Variables, Visitor,
     state_jacobian,
@@ -16,6 +18,9 @@ use crate::inputs::Polynomials;
 
 /// States that are off their manifold by more are brought back at an event.
 const OFF_MANIFOLD: f64 = 1e-8;
+
+/// Half the difference of times by which the rates of moving inputs are taken [s]
+const INPUT_DIFFERENCE: f64 = 1e-4;
 
 /// Largest number of updates for events at one time.
 const MAX_UPDATES: usize = 100;
@@ -182,6 +187,9 @@ struct Driven<'a, const N: usize, const Z: usize, Y: System<N, Z>> {
     system: &'a Y,
     /// Inputs that keep their values
     u: <Y::Model as Model>::Inputs<f64>,
+    /// The same as a list, and room for them as dual numbers
+    values: &'a [f64],
+    duals: RefCell<&'a mut [Dual64]>,
     /// Inputs that move
     course: Option<RefCell<Course<'a>>>,
     d: <Y::Model as Model>::Discrete,
@@ -217,12 +225,47 @@ impl<const N: usize, const Z: usize, Y: System<N, Z>> Ode<N> for Driven<'_, N, Z
         inputs_at!(self, t, u);
         self.system.rates(t, x, u, &self.d)
     }
+    fn jacobian(&self, t: f64, x: &[f64; N], _f: &[f64; N]) -> Result<Jacobian<N>, EvaluationError> {
+        let duals = &mut **self.duals.borrow_mut();
+        let Some(course) = &self.course else {
+            let by_state = state_jacobian(self.system, t, x, self.values, duals, &self.d)?;
+            return self.with_time_derivative(t, x, &by_state, duals);
+        };
+        let mut course = course.borrow_mut();
+        let Course { polynomials, u } = &mut *course;
+        polynomials.evaluate(t, u);
+        let by_state = state_jacobian(self.system, t, x, u, duals, &self.d)?;
+        // rates of the inputs by central differences of their polynomials
+        for (sign, at) in [(1.0, t + INPUT_DIFFERENCE), (-1.0, t - INPUT_DIFFERENCE)] {
+            polynomials.evaluate(at, u);
+            for (dual, u) in duals.iter_mut().zip(u.iter()) {
+                dual.eps += sign * u / (2.0 * INPUT_DIFFERENCE);
+            }
+        }
+        self.with_time_derivative(t, x, &by_state, duals)
+    }
     #[inline]
     fn project(&self, t: f64, x: &mut [f64; N]) -> Result<bool, EvaluationError> {
         self.system.project(t, x)
     }
     fn nominal(&self) -> [f64; N] {
         self.system.nominals()
+    }
+}
+
+impl<const N: usize, const Z: usize, Y: System<N, Z>> Driven<'_, N, Z, Y> {
+    /// The state Jacobian by rows, with df/dt from time and the inputs `u` and their rates.
+    fn with_time_derivative(
+        &self,
+        t: f64,
+        x: &[f64; N],
+        by_state: &Matrix<f64, N, N>,
+        u: &[Dual64],
+    ) -> Result<Jacobian<N>, EvaluationError> {
+        let u = <Y::Model as Model>::Inputs::<Dual64>::load(u);
+        let rates = self.system.rates(Dual64::new(t, 1.0), &x.map(Dual64::from_re), &u, &self.d)?;
+        let rows = std::array::from_fn(|i| std::array::from_fn(|k| by_state[(i, k)]));
+        Ok((rows, rates.map(|rate| rate.eps)))
     }
 }
 
@@ -288,6 +331,8 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
         let mut driven = Driven {
             system,
             u: M::Inputs::<f64>::load(u),
+            values: u,
+            duals: RefCell::new(self.duals),
             course: self.course.map(RefCell::new),
             d: *self.d,
         };
@@ -339,6 +384,10 @@ fn stable(solver: &Solver, (from, to): (f64, f64), eigenvalues: &[Complex]) -> R
         Method::Heun => "heun",
         Method::Rk4 => "rk4",
         Method::Dopri5 => "dopri5",
+        Method::Dop853 => "dop853",
+        Method::Rodas4 => "rodas4",
+        Method::Radau5 => "radau5",
+        Method::Exact => "exact",
     };
     Err(Fault::Unstable {
         t: from,

@@ -24,6 +24,7 @@ mod state;
 mod step;
 mod table;
 mod unit;
+mod values;
 
 pub use describe::model_description;
 pub use events::Event;

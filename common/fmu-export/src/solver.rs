@@ -61,13 +61,16 @@ impl SolverParameters {
     /// Settings of the integrator.
     ///
     /// # Errors
-    /// [`Fault::MethodNotOffered`] for a method that this version lacks.
+    /// [`Fault::MethodNotOffered`] for `exact`: the models are not linear.
     pub fn settings(&self) -> Result<Settings, Fault> {
         let method = match self.method {
             SolverMethod::Heun => Method::Heun,
             SolverMethod::Rk4 => Method::Rk4,
             SolverMethod::Dopri5 => Method::Dopri5,
-            other => return Err(Fault::MethodNotOffered { method: other as i64 }),
+            SolverMethod::Dop853 => Method::Dop853,
+            SolverMethod::Rodas4 => Method::Rodas4,
+            SolverMethod::Radau5 => Method::Radau5,
+            other @ SolverMethod::Exact => return Err(Fault::MethodNotOffered { method: other as i64 }),
         };
         let Self { step, rtol, atol, .. } = *self;
         Ok(Settings { method, step, rtol, atol })

@@ -8,8 +8,8 @@
 //! D = x_1 - x_0,  B = h k_1 - D
 //! ```
 
-use crate::dense::DEGREE;
-use crate::explicit::Tableau;
+use crate::explicit::{POWERS, Tableau};
+use crate::pace::Pace;
 
 const B: [f64; 7] = [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0, 0.0];
 
@@ -26,6 +26,7 @@ const D: [f64; 7] = [
 
 pub(crate) const DOPRI5: Tableau<7> = Tableau {
     order: 5,
+    pace: Pace { order: 5.0, beta: 0.04, shrink: 0.2, grow: 10.0, predictive: false },
     a: [
         [0.0; 7],
         [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -51,8 +52,8 @@ pub(crate) const DOPRI5: Tableau<7> = Tableau {
 };
 
 /// The continuous extension sorted by powers of theta.
-const fn powers_of_theta() -> [[f64; DEGREE]; 7] {
-    let mut dense = [[0.0; DEGREE]; 7];
+const fn powers_of_theta() -> [[f64; POWERS]; 7] {
+    let mut dense = [[0.0; POWERS]; 7];
     let mut i = 0;
     while i < 7 {
         let first = if i == 0 { 1.0 } else { 0.0 };

@@ -55,6 +55,22 @@ pub enum StepError<E> {
         /// State with the largest scaled error, from 0.
         index: usize,
     },
+    /// The equations of an implicit step have no solution near its start, whatever the step size.
+    #[error("the equations of an implicit step of {h:.3e} s at t = {t:.6} s could not be solved")]
+    NoSolution {
+        /// Start of the step [s].
+        t: f64,
+        /// Its length [s].
+        h: f64,
+    },
+    /// The method is for linear systems only.
+    #[error(
+        "the method exact is for linear systems x' = A x + b; this one does not declare itself linear (t = {t:.6} s)"
+    )]
+    NotLinear {
+        /// Start of the call [s].
+        t: f64,
+    },
     /// The interval needs more than [`MAX_STEPS`](crate::MAX_STEPS) steps.
     #[error("more than {} steps of {h:.3e} s needed from t = {t:.6} s to {t_end:.6} s", crate::MAX_STEPS)]
     TooManySteps {

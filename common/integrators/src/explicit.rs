@@ -1,8 +1,12 @@
 //! Explicit Runge-Kutta methods: one code for every table.
 
-use crate::dense::{DEGREE, Dense};
-use crate::one_step::{OneStep, Start};
+use crate::dense::Dense;
+use crate::one_step::{Call, Estimate, OneStep, Start};
+use crate::pace::Pace;
 use crate::{Ode, StepError};
+
+/// Powers of theta in the continuous extension of a table.
+pub(crate) const POWERS: usize = 4;
 
 /// The numbers of an explicit method with `S` stages.
 ///
@@ -14,11 +18,12 @@ use crate::{Ode, StepError};
 /// ```
 pub(crate) struct Tableau<const S: usize> {
     pub(crate) order: u32,
+    pub(crate) pace: Pace,
     pub(crate) a: [[f64; S]; S],
     pub(crate) b: [f64; S],
     pub(crate) c: [f64; S],
     pub(crate) error: [f64; S],
-    pub(crate) dense: [[f64; DEGREE]; S],
+    pub(crate) dense: [[f64; POWERS]; S],
     /// The last stage is evaluated at the new state ("first same as last"): its row of `a` is `b`.
     pub(crate) first_same_as_last: bool,
 }
@@ -43,28 +48,26 @@ fn combine<const N: usize>(x: &[f64; N], h: f64, weights: &[f64], k: &[[f64; N]]
 
 impl<const N: usize, const S: usize> OneStep<N> for Tableau<S> {
     type Trial = Trial<N, S>;
+    type Work = ();
 
     #[inline]
-    fn order(&self) -> u32 {
-        self.order
+    fn pace(&self) -> Pace {
+        self.pace
     }
 
     #[inline]
     fn step<O: Ode<N>>(
         &self,
-        ode: &O,
+        call: &mut Call<'_, N, O, ()>,
         from: &Start<N>,
         h: f64,
-        evaluations: &mut u64,
     ) -> Result<Trial<N, S>, StepError<O::Error>> {
         let mut k = [[0.0; N]; S];
         let mut x = from.x;
         k[0] = from.slope;
         for i in 1..S {
             x = combine(&from.x, h, &self.a[i][..i], &k[..i]);
-            let t = from.t + self.c[i] * h;
-            *evaluations += 1;
-            k[i] = ode.rhs(t, &x).map_err(|source| StepError::Rhs { t, source })?;
+            k[i] = call.rhs(from.t + self.c[i] * h, &x)?;
         }
         if !self.first_same_as_last {
             x = combine(&from.x, h, &self.b, &k);
@@ -83,17 +86,31 @@ impl<const N: usize, const S: usize> OneStep<N> for Tableau<S> {
     }
 
     #[inline]
-    fn error(&self, trial: &Trial<N, S>, h: f64) -> [f64; N] {
-        combine(&[0.0; N], h, &self.error, &trial.k)
+    fn error<O: Ode<N>>(
+        &self,
+        call: &mut Call<'_, N, O, ()>,
+        from: &Start<N>,
+        trial: &Trial<N, S>,
+        h: f64,
+        _fresh: bool,
+    ) -> Estimate<N> {
+        let parts = combine(&[0.0; N], h, &self.error, &trial.k);
+        Estimate { size: call.norm.of(&parts, &from.x, &trial.x), parts }
     }
 
     #[inline]
-    fn dense(&self, from: &Start<N>, trial: &Trial<N, S>, h: f64) -> Dense<N> {
-        let coefficients = std::array::from_fn(|p| {
+    fn dense<O: Ode<N>>(
+        &self,
+        _call: &mut Call<'_, N, O, ()>,
+        from: &Start<N>,
+        trial: &mut Trial<N, S>,
+        h: f64,
+    ) -> Result<Dense<N>, StepError<O::Error>> {
+        let coefficients: [[f64; N]; POWERS] = std::array::from_fn(|p| {
             let weights: [f64; S] = std::array::from_fn(|i| self.dense[i][p]);
             combine(&[0.0; N], h, &weights, &trial.k)
         });
-        Dense { t: from.t, h, start: from.x, end: trial.x, coefficients }
+        Ok(Dense::new(from, h, trial.x, &coefficients))
     }
 }
 

@@ -1,8 +1,8 @@
 //! Equal steps.
 
 use crate::error::all_finite;
-use crate::one_step::{OneStep, Start};
-use crate::run::{MAX_STEPS, Run, Taken, Watch};
+use crate::one_step::{Call, OneStep};
+use crate::run::{MAX_STEPS, Run, Watch};
 use crate::{Ode, Settings, StepError};
 
 /// Runs to `t_end` in `n` equal steps, see [`Settings::inner_steps`].
@@ -12,7 +12,7 @@ use crate::{Ode, Settings, StepError};
 pub(crate) fn fixed<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
     method: &M,
     settings: &Settings,
-    ode: &O,
+    call: &mut Call<'_, N, O, M::Work>,
     run: &mut Run<N>,
     t_end: f64,
     watch: &mut W,
@@ -28,24 +28,19 @@ pub(crate) fn fixed<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
     let h = span / steps;
     let mut slope = None;
     for i in 1..=n {
-        let from = Start {
-            t: run.t,
-            x: run.x,
-            slope: match slope.take() {
-                Some(slope) => slope,
-                None => run.slope(ode)?,
-            },
-        };
-        let trial = method.step(ode, &from, h, &mut run.statistics.rhs_evaluations)?;
+        let from = run.start(call, slope.take())?;
+        method.begin(call, &from)?;
+        let mut trial = method.step(call, &from, h)?;
         let t = if i == n { t_end } else { t_start + f64::from(i) * h };
         all_finite(t, M::state(&trial))?;
         if W::WATCHES {
-            let taken = Taken { from: &from, trial: &trial, h, t, last: i == n };
-            if run.watch(method, ode, &taken, watch)? {
+            let dense = method.dense(call, &from, &mut trial, h)?;
+            if run.watch(method, call, (&from, &dense), (t, i == n), watch)? {
                 return Ok(());
             }
         }
-        if !run.accept(ode, t, M::state(&trial))? {
+        method.accepted(call.work, &trial, h);
+        if !run.accept(call, t, M::state(&trial))? {
             slope = method.slope(&trial).copied();
         }
     }

@@ -9,9 +9,11 @@
 //! Source: K. Heun, Z. Math. Phys. 45 (1900); extension: the quadratic through the two slopes.
 
 use crate::explicit::Tableau;
+use crate::pace::Pace;
 
 pub(crate) const HEUN: Tableau<2> = Tableau {
     order: 2,
+    pace: Pace::NONE,
     a: [[0.0, 0.0], [1.0, 0.0]],
     b: [0.5, 0.5],
     c: [0.0, 1.0],

@@ -32,19 +32,35 @@
 //! ```
 #![forbid(unsafe_code)]
 #![allow(rustdoc::broken_intra_doc_links, reason = "units stand in brackets")]
+#![allow(clippy::needless_range_loop, reason = "indices as in the equations")]
+
+#[cfg(test)]
+extern crate self as integrators;
+#[cfg(test)]
+#[path = "../tests/common/mod.rs"]
+mod common;
 
 mod adaptive;
+mod complex;
 mod dense;
+mod dop853;
 mod dopri5;
 mod error;
 mod events;
+mod exact;
 mod explicit;
 mod fixed;
 mod heun;
+mod lu;
+mod matrix;
 mod method;
+mod norm;
 mod ode;
 mod one_step;
+mod pace;
+mod radau5;
 mod rk4;
+mod rodas4;
 mod root;
 mod run;
 mod settings;
@@ -52,13 +68,15 @@ mod solver;
 mod stability;
 mod statistics;
 
+pub use complex::Complex;
 pub use dense::Dense;
 pub use error::{SettingsError, StepError};
 pub use events::{Crossing, Indicators, Reached};
+pub use exact::Transition;
 pub use method::Method;
-pub use ode::Ode;
+pub use ode::{Jacobian, Ode};
 pub use run::MAX_STEPS;
 pub use settings::Settings;
 pub use solver::{Memory, Solver};
-pub use stability::{Complex, MAX_AMPLIFICATION, largest_stable_step, violates};
+pub use stability::{MAX_AMPLIFICATION, largest_stable_step, violates};
 pub use statistics::Statistics;

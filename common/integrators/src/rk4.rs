@@ -12,12 +12,14 @@
 //! has the order of a cubic Hermite polynomial (3, local error `O(h^4)`) and needs no slope at the new state.
 
 use crate::explicit::Tableau;
+use crate::pace::Pace;
 
 const THIRD: f64 = 1.0 / 3.0;
 const SIXTH: f64 = 1.0 / 6.0;
 
 pub(crate) const RK4: Tableau<4> = Tableau {
     order: 4,
+    pace: Pace::NONE,
     a: [[0.0, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
     b: [SIXTH, THIRD, THIRD, SIXTH],
     c: [0.0, 0.5, 0.5, 1.0],

@@ -1,8 +1,8 @@
 //! What the drivers share: the moving state, and who looks at the steps.
 
 use crate::error::all_finite;
-use crate::one_step::{OneStep, Start};
-use crate::{Dense, Ode, Statistics, StepError};
+use crate::one_step::{Call, OneStep, Start};
+use crate::{Dense, Ode, StepError};
 
 /// Most steps that one call may take, rejected ones included: a hundredfold of the longest sensible call.
 ///
@@ -14,29 +14,35 @@ pub const MAX_STEPS: u32 = 10_000_000;
 pub(crate) struct Run<const N: usize> {
     pub(crate) t: f64,
     pub(crate) x: [f64; N],
-    pub(crate) statistics: Statistics,
 }
 
 impl<const N: usize> Run<N> {
-    /// `f(t, x)`, counted.
+    /// Where the next step begins; `slope` if it is known already.
     #[inline]
-    pub(crate) fn slope<O: Ode<N>>(&mut self, ode: &O) -> Result<[f64; N], StepError<O::Error>> {
-        self.statistics.rhs_evaluations += 1;
-        ode.rhs(self.t, &self.x).map_err(|source| StepError::Rhs { t: self.t, source })
+    pub(crate) fn start<O: Ode<N>, W>(
+        &self,
+        call: &mut Call<'_, N, O, W>,
+        slope: Option<[f64; N]>,
+    ) -> Result<Start<N>, StepError<O::Error>> {
+        let slope = match slope {
+            Some(slope) => slope,
+            None => call.rhs(self.t, &self.x)?,
+        };
+        Ok(Start { t: self.t, x: self.x, slope })
     }
 
     /// Moves on to a new state and projects it; the result says whether the projection changed it.
     #[inline]
-    pub(crate) fn accept<O: Ode<N>>(
+    pub(crate) fn accept<O: Ode<N>, W>(
         &mut self,
-        ode: &O,
+        call: &mut Call<'_, N, O, W>,
         t: f64,
         x: &[f64; N],
     ) -> Result<bool, StepError<O::Error>> {
         self.t = t;
         self.x = *x;
-        self.statistics.steps += 1;
-        let changed = ode.project(t, &mut self.x).map_err(|source| StepError::Rhs { t, source })?;
+        call.statistics.steps += 1;
+        let changed = call.ode.project(t, &mut self.x).map_err(|source| StepError::Rhs { t, source })?;
         if changed {
             all_finite(t, &self.x)?;
         }
@@ -44,40 +50,28 @@ impl<const N: usize> Run<N> {
     }
 
     /// Shows a step to the observer; true if it ends the run, which then stands where the observer wants it.
+    ///
+    /// `t` is the end of the step (`from.t + h` but for rounding), and `last` says that it ends the call.
     pub(crate) fn watch<M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
         &mut self,
         method: &M,
-        ode: &O,
-        taken: &Taken<N, M::Trial>,
+        call: &mut Call<'_, N, O, M::Work>,
+        (from, dense): (&Start<N>, &Dense<N>),
+        (t, last): (f64, bool),
         watch: &mut W,
     ) -> Result<bool, StepError<O::Error>> {
-        let Taken { from, trial, h, t, .. } = *taken;
-        let restep = |theta: f64| {
-            let trial = method.step(ode, from, theta * h, &mut self.statistics.rhs_evaluations)?;
-            Ok(*M::state(&trial))
-        };
-        let Some(Stop { theta, x }) = watch.inspect(&method.dense(from, trial, h), taken.last, restep)?
-        else {
+        let h = dense.h;
+        let restep = |theta: f64| Ok(*M::state(&method.step(call, from, theta * h)?));
+        let Some(Stop { theta, x }) = watch.inspect(dense, last, restep)? else {
             return Ok(false);
         };
         if theta > 0.0 {
             let t = if theta >= 1.0 { t } else { from.t + theta * h };
             all_finite(t, &x)?;
-            self.accept(ode, t, &x)?;
+            self.accept(call, t, &x)?;
         }
         Ok(true)
     }
-}
-
-/// A step that a driver is about to accept.
-pub(crate) struct Taken<'a, const N: usize, T> {
-    pub(crate) from: &'a Start<N>,
-    pub(crate) trial: &'a T,
-    pub(crate) h: f64,
-    /// Its end; `from.t + h` but for rounding.
-    pub(crate) t: f64,
-    /// It ends the call.
-    pub(crate) last: bool,
 }
 
 /// Where an observer ends the run.

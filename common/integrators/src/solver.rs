@@ -1,11 +1,17 @@
 //! The solver: settings and the little that a call leaves for the next one.
 
 use crate::adaptive::adaptive;
+use crate::dop853::Dop853;
 use crate::dopri5::DOPRI5;
 use crate::events::{Indicators, Monitor, Reached};
+use crate::exact::{Exact, Transition};
 use crate::fixed::fixed;
 use crate::heun::HEUN;
+use crate::norm::Norm;
+use crate::one_step::{Call, OneStep};
+use crate::radau5::{self, Radau5};
 use crate::rk4::RK4;
+use crate::rodas4::{self, Rodas4};
 use crate::run::{Run, Show, Unwatched, Watch};
 use crate::{Dense, Method, Ode, Settings, SettingsError, Statistics, StepError};
 
@@ -80,7 +86,23 @@ impl Solver {
         x: &mut [f64; N],
         statistics: &mut Statistics,
     ) -> Result<(), StepError<O::Error>> {
-        self.run(ode, [t, t_end], x, statistics, &mut Unwatched).map(|_| ())
+        self.run(ode, [t, t_end], x, statistics, &mut Unwatched, None).map(|_| ())
+    }
+
+    /// As [`advance`](Self::advance), and the method `exact` keeps its matrices in `cache` for the next call.
+    ///
+    /// # Errors
+    /// As [`advance`](Self::advance); the cache then may have changed and still holds.
+    pub fn advance_cached<const N: usize, O: Ode<N>>(
+        &mut self,
+        ode: &O,
+        cache: &mut Transition<N>,
+        t: f64,
+        t_end: f64,
+        x: &mut [f64; N],
+        statistics: &mut Statistics,
+    ) -> Result<(), StepError<O::Error>> {
+        self.run(ode, [t, t_end], x, statistics, &mut Unwatched, Some(cache)).map(|_| ())
     }
 
     /// As [`advance`](Self::advance), and shows the dense output of every accepted step to `each`.
@@ -96,7 +118,7 @@ impl Solver {
         statistics: &mut Statistics,
         each: impl FnMut(&Dense<N>),
     ) -> Result<(), StepError<O::Error>> {
-        self.run(ode, [t, t_end], x, statistics, &mut Show(each)).map(|_| ())
+        self.run(ode, [t, t_end], x, statistics, &mut Show(each), None).map(|_| ())
     }
 
     /// As [`advance`](Self::advance), but stops just after the first zero crossing of any indicator.
@@ -116,7 +138,7 @@ impl Solver {
         statistics: &mut Statistics,
     ) -> Result<Reached<M>, StepError<O::Error>> {
         let mut monitor = Monitor::new(events);
-        let t = self.run(ode, [t, t_end], x, statistics, &mut monitor)?;
+        let t = self.run(ode, [t, t_end], x, statistics, &mut monitor, None)?;
         Ok(monitor.which.map_or(Reached::End, |which| Reached::Event { t, which }))
     }
 
@@ -129,6 +151,7 @@ impl Solver {
         x: &mut [f64; N],
         statistics: &mut Statistics,
         watch: &mut W,
+        cache: Option<&mut Transition<N>>,
     ) -> Result<f64, StepError<O::Error>> {
         if !(t.is_finite() && t_end.is_finite() && t <= t_end) {
             return Err(StepError::Interval { t, t_end });
@@ -136,16 +159,63 @@ impl Solver {
         if t >= t_end {
             return Ok(t);
         }
-        let mut run = Run { t, x: *x, statistics: *statistics };
-        let mut memory = self.memory;
+        let mut call = Called {
+            settings: self.settings,
+            memory: self.memory,
+            ode,
+            run: Run { t, x: *x },
+            statistics: *statistics,
+            t_end,
+            watch,
+        };
         match self.settings.method {
-            Method::Heun => fixed(&HEUN, &self.settings, ode, &mut run, t_end, watch)?,
-            Method::Rk4 => fixed(&RK4, &self.settings, ode, &mut run, t_end, watch)?,
-            Method::Dopri5 => adaptive(&DOPRI5, &self.settings, &mut memory, ode, &mut run, t_end, watch)?,
+            Method::Heun => call.with(&HEUN, &mut ())?,
+            Method::Rk4 => call.with(&RK4, &mut ())?,
+            Method::Dopri5 => call.with(&DOPRI5, &mut ())?,
+            Method::Dop853 => call.with(&Dop853, &mut ())?,
+            Method::Rodas4 => call.with(&Rodas4, &mut rodas4::Work::default())?,
+            Method::Radau5 => call.with(&Radau5, &mut radau5::Work::default())?,
+            Method::Exact if !ode.linear() => return Err(StepError::NotLinear { t }),
+            Method::Exact => match cache {
+                Some(cache) => call.with(&Exact, cache)?,
+                None => call.with(&Exact, &mut Transition::default())?,
+            },
         }
-        *x = run.x;
-        *statistics = run.statistics;
-        self.memory = memory;
-        Ok(run.t)
+        *x = call.run.x;
+        *statistics = call.statistics;
+        self.memory = call.memory;
+        Ok(call.run.t)
+    }
+}
+
+/// Working copies of a call.
+struct Called<'a, const N: usize, O, W> {
+    settings: Settings,
+    memory: Memory,
+    ode: &'a O,
+    run: Run<N>,
+    statistics: Statistics,
+    t_end: f64,
+    watch: &'a mut W,
+}
+
+impl<const N: usize, O: Ode<N>, W: Watch<N>> Called<'_, N, O, W> {
+    /// Carries out the call with one method.
+    #[inline]
+    fn with<M: OneStep<N>>(&mut self, method: &M, work: &mut M::Work) -> Result<(), StepError<O::Error>> {
+        let Self { settings, run, t_end, watch, .. } = self;
+        let mut call = Call {
+            ode: self.ode,
+            norm: Norm::new(self.ode, settings, method.tolerance(settings.rtol)),
+            statistics: self.statistics,
+            work,
+        };
+        if settings.method.is_adaptive() {
+            adaptive(method, &mut self.memory, &mut call, run, *t_end, *watch)?;
+        } else {
+            fixed(method, settings, &mut call, run, *t_end, *watch)?;
+        }
+        self.statistics = call.statistics;
+        Ok(())
     }
 }

@@ -6,64 +6,14 @@
 //! The coefficients come from the same table as the steps. Source: Hairer & Wanner, *Solving Ordinary Differential
 //! Equations II*, section IV.2.
 
-use crate::Method;
 use crate::explicit::Tableau;
-use std::ops::{Add, Mul};
+use crate::lu::Lu;
+use crate::{Complex, Method};
 
 /// Largest growth per step that is taken for the system's own: 10 %.
 ///
 /// A growing mode (`Re lambda > 0`) reaches it at `h Re(lambda) = 0.095`, where a step is coarse anyway.
 pub const MAX_AMPLIFICATION: f64 = 1.1;
-
-/// A complex number, just enough for stability functions.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Complex {
-    /// Real part
-    pub re: f64,
-    /// Imaginary part
-    pub im: f64,
-}
-
-impl Complex {
-    /// `re + im i`
-    #[must_use]
-    pub const fn new(re: f64, im: f64) -> Self {
-        Self { re, im }
-    }
-
-    /// Magnitude.
-    #[must_use]
-    pub fn abs(self) -> f64 {
-        self.re.hypot(self.im)
-    }
-}
-
-impl From<(f64, f64)> for Complex {
-    fn from((re, im): (f64, f64)) -> Self {
-        Self { re, im }
-    }
-}
-
-impl Add for Complex {
-    type Output = Self;
-    fn add(self, other: Self) -> Self {
-        Self::new(self.re + other.re, self.im + other.im)
-    }
-}
-
-impl Mul for Complex {
-    type Output = Self;
-    fn mul(self, other: Self) -> Self {
-        Self::new(self.re * other.re - self.im * other.im, self.re * other.im + self.im * other.re)
-    }
-}
-
-impl Mul<Complex> for f64 {
-    type Output = Complex;
-    fn mul(self, z: Complex) -> Complex {
-        Complex::new(self * z.re, self * z.im)
-    }
-}
 
 /// `R(z)` of an explicit method by Horner's rule.
 pub(crate) fn explicit<const S: usize>(method: &Tableau<S>, z: Complex) -> Complex {
@@ -78,11 +28,36 @@ pub(crate) fn explicit<const S: usize>(method: &Tableau<S>, z: Complex) -> Compl
     one + z * coefficients.iter().rev().fold(Complex::default(), |sum, c| Complex::new(*c, 0.0) + z * sum)
 }
 
+/// `R(z)` of an implicit method with the table `a` (or `alpha + gamma` of a Rosenbrock method) and the weights `b`.
+///
+/// Its limit 0 far out: only L-stable methods come here.
+pub(crate) fn implicit<const S: usize>(a: &[[f64; S]; S], b: &[f64; S], z: Complex) -> Complex {
+    const FAR: f64 = 1e100;
+    if z.abs() > FAR {
+        return Complex::default();
+    }
+    let one = Complex::new(1.0, 0.0);
+    let equations: [[Complex; S]; S] = std::array::from_fn(|i| {
+        std::array::from_fn(|j| {
+            let unit = if i == j { one } else { Complex::default() };
+            unit - a[i][j] * z
+        })
+    });
+    let Some(lu) = Lu::new(&equations) else {
+        return Complex::new(f64::INFINITY, 0.0); // a pole, or not a number
+    };
+    let k = lu.solve(&[one; S]);
+    one + z * b.iter().zip(k).fold(Complex::default(), |sum, (b, k)| sum + *b * k)
+}
+
 /// Whether a step of `h` makes the mode `lambda` grow by more than [`MAX_AMPLIFICATION`].
 ///
-/// True as well where the growth is not a number.
+/// True as well where the growth is not a number. Never for A-stable methods: what grows there grows by itself.
 #[must_use]
 pub fn violates(method: Method, h: f64, lambda: Complex) -> bool {
+    if method.is_a_stable() {
+        return !(lambda.re.is_finite() && lambda.im.is_finite());
+    }
     let growth = method.stability(h * lambda).abs();
     growth.is_nan() || growth > MAX_AMPLIFICATION
 }

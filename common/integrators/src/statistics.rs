@@ -8,5 +8,11 @@ pub struct Statistics {
     /// Trial steps thrown away by an adaptive method.
     pub rejected: u64,
     /// Evaluations of the right-hand side, those of rejected steps, start guesses and event location included.
+    ///
+    /// Those inside [`Ode::jacobian`](crate::Ode::jacobian) are not: by the default, `N + 1` for each of `jacobians`.
     pub rhs_evaluations: u64,
+    /// Jacobians of an implicit method.
+    pub jacobians: u64,
+    /// Matrices decomposed by an implicit method; Radau5's real and complex one together count as one.
+    pub decompositions: u64,
 }

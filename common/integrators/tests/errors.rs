@@ -2,9 +2,10 @@
 
 mod common;
 
-use common::{Linear, solver};
+use common::{GENERAL, Kepler, Linear, solver};
 use integrators::{
-    Indicators, MAX_STEPS, Memory, Method, Ode, Settings, SettingsError, Solver, Statistics, StepError,
+    Indicators, Jacobian, MAX_STEPS, Memory, Method, Ode, Settings, SettingsError, Solver, Statistics,
+    StepError,
 };
 
 /// Where the model has no value.
@@ -52,7 +53,11 @@ fn failure<const N: usize, O: Ode<N>>(
 where
     O::Error: std::fmt::Debug,
 {
-    let before = (x, Statistics { steps: 3, rejected: 2, rhs_evaluations: 1 }, *solver);
+    let before = (
+        x,
+        Statistics { steps: 3, rejected: 2, rhs_evaluations: 1, jacobians: 4, decompositions: 5 },
+        *solver,
+    );
     let (mut x, mut statistics, _) = before;
     let error = solver.advance(ode, t, t_end, &mut x, &mut statistics).expect_err("must fail");
     assert_eq!((x, statistics, *solver), before);
@@ -113,7 +118,7 @@ fn adaptive_steps_shrink_at_an_error_of_the_model() {
 /// At the very start of a step there is nothing to shrink.
 #[test]
 fn an_error_at_the_start_is_returned_at_once() {
-    for method in Method::ALL {
+    for method in GENERAL {
         let error = failure(&mut solver(method, 0.1, 1e-6), &Strut, [1.0, 2.0], [-0.5]);
         assert_eq!(error, StepError::Rhs { t: 1.0, source: NoStrut(-0.5) });
     }
@@ -169,6 +174,68 @@ fn too_many_steps_are_refused_before_the_first() {
     );
 }
 
+/// The transition matrix is for those who declare themselves linear.
+#[test]
+fn exact_is_refused_for_a_system_that_is_not_linear() {
+    let orbit = Kepler { e: 0.5 };
+    let error = failure(&mut solver(Method::Exact, 0.1, 1e-6), &orbit, [0.5, 1.0], orbit.exact(0.5));
+    assert_eq!(error, StepError::NotLinear { t: 0.5 });
+    assert_eq!(
+        error.to_string(),
+        "the method exact is for linear systems x' = A x + b; this one does not declare itself linear (t = 0.500000 s)"
+    );
+}
+
+/// `x' = A x` with a Jacobian that says otherwise.
+struct Claims([[f64; 1]; 1]);
+
+impl Ode<1> for Claims {
+    type Error = NoStrut;
+    fn rhs(&self, _t: f64, x: &[f64; 1]) -> Result<[f64; 1], NoStrut> {
+        Ok([-x[0]])
+    }
+    fn jacobian(&self, _t: f64, _x: &[f64; 1], _f: &[f64; 1]) -> Result<Jacobian<1>, NoStrut> {
+        if self.0[0][0] > 1e300 { Err(NoStrut(1.0)) } else { Ok((self.0, [0.0])) }
+    }
+    fn linear(&self) -> bool {
+        true
+    }
+}
+
+/// A Jacobian that fails or is not finite ends the call with the time of the step.
+#[test]
+fn a_jacobian_without_a_value_ends_the_call() {
+    for method in [Method::Rodas4, Method::Radau5, Method::Exact] {
+        let mut solver = solver(method, 0.1, 1e-6);
+        let error = failure(&mut solver, &Claims([[1e301]]), [1.0, 2.0], [1.0]);
+        assert_eq!(error, StepError::Rhs { t: 1.0, source: NoStrut(1.0) });
+        let error = failure(&mut solver, &Claims([[f64::NAN]]), [1.0, 2.0], [1.0]);
+        assert!(
+            matches!(error, StepError::NotFinite { t, index: 0, .. } if (t - 1.0).abs() < 1e-15),
+            "{error:?}"
+        );
+    }
+}
+
+/// A slope that jumps with the sign of the state at `x = 0`, towards it: no smooth solution beyond, the iteration finds
+/// none, and the step falls to the resolution of time.
+struct Trap;
+
+impl Ode<1> for Trap {
+    type Error = NoStrut;
+    fn rhs(&self, _t: f64, x: &[f64; 1]) -> Result<[f64; 1], NoStrut> {
+        Ok([if x[0] > 0.0 { -1.0 } else { f64::INFINITY }])
+    }
+}
+
+#[test]
+fn an_iteration_without_a_solution_ends_in_an_error() {
+    let error = failure(&mut solver(Method::Radau5, 0.1, 1e-6), &Trap, [0.0, 1.0], [0.5]);
+    let StepError::NoSolution { t, h } = error else { panic!("{error:?}") };
+    assert!((t - 0.5).abs() < 1e-9 && h < 1e-14, "{error:?}");
+    assert!(error.to_string().starts_with("the equations of an implicit step of"), "{error}");
+}
+
 struct Undefined;
 
 impl Indicators<2, 2> for Undefined {
@@ -205,7 +272,7 @@ impl Ode<1> for Projected {
 
 #[test]
 fn a_failing_projection_fails_the_call() {
-    for method in Method::ALL {
+    for method in GENERAL {
         let mut solver = solver(method, 1.0, 1e-6);
         let error = failure(&mut solver, &Projected(Err(NoStrut(0.0))), [0.0, 1.0], [0.0]);
         assert!(matches!(error, StepError::Rhs { source: NoStrut(_), .. }));

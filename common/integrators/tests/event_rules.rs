@@ -3,7 +3,7 @@
 mod common;
 
 use common::events::{Drift, Fall, When, event, until};
-use common::{Kepler, Linear, fixed, solver};
+use common::{GENERAL, Kepler, Linear, fixed, solver};
 use integrators::{Crossing, Method, Ode, Reached, Settings, Solver, Statistics};
 use std::convert::Infallible;
 
@@ -142,7 +142,7 @@ fn two_crossings_within_a_step_are_seen() {
 /// The way up to the event is the same, bit by bit, as without indicators.
 #[test]
 fn indicators_do_not_disturb_the_run() {
-    for method in Method::ALL {
+    for method in GENERAL {
         let orbit = Kepler { e: 0.6 };
         let never = When(|_, _: &[f64; 4]| [1.0]);
         let (mut x, mut y) = (orbit.exact(0.0), orbit.exact(0.0));
@@ -151,6 +151,9 @@ fn indicators_do_not_disturb_the_run() {
         let mut other = one;
         assert_eq!(one.advance_until(&orbit, &never, 0.0, 7.0, &mut x, &mut s), Ok(Reached::End));
         assert_eq!(other.advance(&orbit, 0.0, 7.0, &mut y, &mut r), Ok(()));
+        if method == Method::Dop853 {
+            r.rhs_evaluations += 3 * r.steps + 1; // its continuous extension, and the slope at the last state
+        }
         assert_eq!((x.map(f64::to_bits), s, one), (y.map(f64::to_bits), r, other));
     }
 }

@@ -2,7 +2,9 @@
 
 mod common;
 
-use common::{Kepler, Pendulum, Swing, assert_order, distance, fixed, in_calls, slope, solver};
+use common::{
+    Kepler, Pendulum, Swing, assert_order, assert_order_within, distance, fixed, in_calls, slope, solver,
+};
 use integrators::{Dense, Method, Ode, Statistics};
 use std::convert::Infallible;
 
@@ -43,6 +45,17 @@ fn rk4_has_order_4() {
 fn dopri5_with_forced_steps_has_order_5() {
     assert_order(&swing_errors(Method::Dopri5, 30), 5.0);
     assert_order(&kepler_errors(Method::Dopri5, 40), 5.0);
+}
+
+#[test]
+fn dop853_with_forced_steps_has_order_8() {
+    assert_order(&swing_errors(Method::Dop853, 8)[..4], 8.0);
+}
+
+#[test]
+fn rodas4_with_forced_steps_has_order_4() {
+    assert_order_within(&swing_errors(Method::Rodas4, 240)[..4], 4.0, 0.2);
+    assert_order(&kepler_errors(Method::Rodas4, 120)[..4], 4.0);
 }
 
 /// Error against tolerance on a log-log scale has slope 1, and the error stays within the growth along the orbit.
@@ -194,7 +207,10 @@ fn arenstorf(tolerance: f64) -> (Vec<[f64; 2]>, [f64; 2], Statistics) {
 #[test]
 fn arenstorf_orbit_runs_as_published() {
     let (found, _, statistics) = arenstorf(1e-7);
-    assert_eq!(statistics, Statistics { steps: 216, rejected: 22 + 2, rhs_evaluations: 1442 });
+    assert_eq!(
+        statistics,
+        Statistics { steps: 216, rejected: 22 + 2, rhs_evaluations: 1442, ..Statistics::default() }
+    );
     for (found, (published, exact)) in found.iter().zip(&PUBLISHED) {
         // even the error is the published one, to the rounding that the orbit amplifies (0.3 % of it)
         let error = distance(published, exact);

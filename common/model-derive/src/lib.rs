@@ -68,6 +68,7 @@ fn documentation(attrs: &[Attribute]) -> (String, Option<String>) {
     (text, None)
 }
 
+#[allow(clippy::struct_excessive_bools, reason = "one for each key without a value")]
 #[derive(Default)]
 struct FieldAttributes {
     prefix: String,

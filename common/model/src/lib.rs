@@ -25,7 +25,7 @@ mod variable;
 pub use error::{EvaluationError, ParameterError};
 pub use jacobian::{Dense, Spectrum, directional, state_jacobian};
 pub use leaf::{NoVariables, SymmetricTensor, Vector3};
-pub use mechanics::Scalar;
+pub use mechanics::{Matrix, Scalar};
 pub use model_derive::{Enumeration, Variables};
 pub use system::{Experiment, Group, Model, Outputs, System, Visitor};
 pub use variable::{

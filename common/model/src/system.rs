@@ -71,7 +71,7 @@ pub trait Model: Clone + Sized + 'static {
     /// Take over changed tunable parameters; nothing else may change.
     fn retune(&mut self, parameters: &Self::Parameters);
 
-    /// Leave out what acts between the steps of the own solver: a foreign one integrates the rates.
+    /// What differs when a host integrates the states (no projection after steps).
     fn for_model_exchange(&mut self) {}
 
     /// Cases that are allowed but probably not meant, as log messages.
@@ -186,14 +186,15 @@ pub trait System<const N: usize, const Z: usize> {
         Ok(false)
     }
 
-    /// How far unit quaternions and the like are from where they belong; smooth constraints, which the
-    /// rates hold, do not count.
+    /// How far orientations are off their manifold (unit quaternions, unit vectors).
     fn off_manifold(&self, _x: &[f64; N]) -> f64 {
         0.0
     }
 
-    /// Bring the states back from [`System::off_manifold`].
-    fn normalise(&self, _x: &mut [f64; N]) {}
+    /// Bring orientations back on their manifold; true if they changed.
+    fn normalise(&self, _x: &mut [f64; N]) -> bool {
+        false
+    }
 
     /// Functions whose sign changes are events.
     fn indicators(

@@ -100,8 +100,8 @@ pub struct Entry {
     pub max: f64,
     /// Typical magnitude
     pub nominal: f64,
-    /// Inputs and states (or groups of them, by prefix) that the value depends on directly; a state
-    /// depends on itself without being named
+    /// Inputs and states that the value depends on directly: names, groups by prefix (`P.F`), or the
+    /// same component of a group (`A.r.@`); a state depends on itself without being named
     pub depends: &'static [&'static str],
     /// Present for a state
     pub rate: Option<Rate>,
@@ -112,7 +112,7 @@ pub struct Entry {
 pub struct Rate {
     /// Unit of the derivative
     pub unit: &'static str,
-    /// Inputs and states (or groups of them, by prefix) that the derivative depends on directly
+    /// Inputs and states that the derivative depends on directly, in the same notation
     pub depends: &'static [&'static str],
 }
 

@@ -1,5 +1,9 @@
-//! What the tests share: an instance addressed by names.
+//! What the tests share: an instance addressed by names, and two small models.
 
+#![allow(non_snake_case, reason = "port letters")]
+
+pub mod ball;
+pub mod rod;
 pub mod sparsity;
 
 use fmu_export::{Fault, Instance, Interface, Table};

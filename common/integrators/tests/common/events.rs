@@ -1,7 +1,7 @@
 //! Motions and indicators for event tests.
 #![allow(dead_code, reason = "each test file uses its part")]
 
-use integrators::{Crossing, Indicators, Ode, Reached, Solver, Statistics};
+use integrators::{Crossing, Indicators, Jacobian, Ode, Reached, Solver, Statistics};
 use std::convert::Infallible;
 
 /// Free fall, height and speed: exact for methods of order 2 and more.
@@ -12,6 +12,12 @@ impl Ode<2> for Fall {
     fn rhs(&self, _t: f64, x: &[f64; 2]) -> Result<[f64; 2], Infallible> {
         Ok([x[1], -9.81])
     }
+    fn jacobian(&self, _t: f64, _x: &[f64; 2], _f: &[f64; 2]) -> Result<Jacobian<2>, Infallible> {
+        Ok(([[0.0, 1.0], [0.0, 0.0]], [0.0; 2]))
+    }
+    fn linear(&self) -> bool {
+        true
+    }
 }
 
 /// A constant slope.
@@ -21,6 +27,9 @@ impl Ode<1> for Drift {
     type Error = Infallible;
     fn rhs(&self, _t: f64, _x: &[f64; 1]) -> Result<[f64; 1], Infallible> {
         Ok([self.0])
+    }
+    fn linear(&self) -> bool {
+        true
     }
 }
 

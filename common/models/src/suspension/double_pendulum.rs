@@ -116,6 +116,7 @@ impl Model for DoublePendulum {
     const NAME: &'static str = "double_pendulum";
     const DESCRIPTION: &'static str = "Planar double pendulum of two rods with a leader port at the tip";
     const EXPERIMENT: Experiment = Experiment { stop: 3.0, step: 0.02 };
+    const MODEL_EXCHANGE: bool = false; // states not marked yet
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;
@@ -197,7 +198,7 @@ impl System<7, 0> for DoublePendulum {
         _: S,
         _: &[S; 7],
         _: &Inputs<S>,
-        _: &(),
+        (): &(),
     ) -> Result<NoVariables, EvaluationError> {
         Ok(NoVariables)
     }

@@ -487,8 +487,8 @@ where
         self.assembly.off_manifold(&x[..self.mechanical()])
     }
 
-    fn normalise(&self, x: &mut [f64; X]) {
-        self.assembly.normalise(&mut x[..self.mechanical()]);
+    fn normalise(&self, x: &mut [f64; X]) -> bool {
+        self.assembly.normalise(&mut x[..self.mechanical()])
     }
 
     fn next_event(&self, d: &PulsePhase) -> Option<f64> {

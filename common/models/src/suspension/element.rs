@@ -210,8 +210,8 @@ macro_rules! element_functions {
             self.element.joint.off_manifold(&x[..self.element.mechanical()])
         }
 
-        fn normalise(&self, x: &mut [f64; X]) {
-            self.element.joint.normalise(&mut x[..self.element.mechanical()]);
+        fn normalise(&self, x: &mut [f64; X]) -> bool {
+            self.element.joint.normalise(&mut x[..self.element.mechanical()])
         }
     };
 }

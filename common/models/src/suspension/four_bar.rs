@@ -179,6 +179,7 @@ impl Model for FourBar {
     const NAME: &'static str = "four_bar";
     const DESCRIPTION: &'static str = "Planar four-bar linkage with a leader port on the coupler";
     const EXPERIMENT: Experiment = Experiment { stop: 5.0, step: 0.02 };
+    const MODEL_EXCHANGE: bool = false; // states not marked yet
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;
@@ -298,7 +299,7 @@ impl System<9, 0> for FourBar {
         _: S,
         _: &[S; 9],
         _: &Inputs<S>,
-        _: &(),
+        (): &(),
     ) -> Result<NoVariables, EvaluationError> {
         Ok(NoVariables)
     }

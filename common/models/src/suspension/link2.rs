@@ -171,6 +171,7 @@ impl Model for Link2 {
     const DESCRIPTION: &'static str =
         "Rigid rod with follower port A at its joint and leader port B at its tip";
     const EXPERIMENT: Experiment = Experiment { stop: 2.0, step: 0.01 };
+    const MODEL_EXCHANGE: bool = false; // states not marked yet
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;

@@ -242,6 +242,7 @@ impl Model for Link3 {
     const DESCRIPTION: &'static str =
         "Rigid carrier with follower port B, leader port C and force point P with two slots";
     const EXPERIMENT: Experiment = Experiment { stop: 2.0, step: 0.01 };
+    const MODEL_EXCHANGE: bool = false; // states not marked yet
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;

@@ -248,6 +248,7 @@ impl Model for StrutLink {
     const NAME: &'static str = "strut_link";
     const DESCRIPTION: &'static str = "Rigid rod with a spring-damper to the chassis, follower port D at its joint and leader port C at its tip";
     const EXPERIMENT: Experiment = Experiment { stop: 2.0, step: 0.01 };
+    const MODEL_EXCHANGE: bool = false; // states not marked yet
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;

@@ -1,0 +1,162 @@
+//! Get and Set: values by reference, all or none.
+
+use model::{Causality, Entry, Kind, Model, Variability};
+
+use crate::phase::{Interface, Phase};
+use crate::state::State;
+use crate::table::{ALL_PARTS, FLOAT, Layout, Variable, allowed, changes_in_a_run, kind_name};
+use crate::{Fault, Instance};
+
+impl<M: Model> Instance<M> {
+    /// Read Float64 variables.
+    ///
+    /// # Errors
+    /// Unknown references, other types, outputs that have no value now.
+    pub fn get_float64(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Fault> {
+        same_length(references.len(), values.len())?;
+        let mut needed = 0;
+        for reference in references {
+            match self.table.access.get(*reference as usize) {
+                Some(access) if access & FLOAT != 0 => needed |= access,
+                _ => return Err(self.wrong_type(*reference, "Float64")),
+            }
+        }
+        self.refresh(needed & ALL_PARTS)?;
+        for (value, reference) in values.iter_mut().zip(references) {
+            *value = self.state.values[*reference as usize];
+        }
+        Ok(())
+    }
+
+    fn wrong_type(&self, reference: u32, called: &'static str) -> Fault {
+        match self.variable(reference) {
+            Ok(v) => {
+                Fault::WrongType { variable: v.name.clone(), reference, is: kind_name(v.entry.kind), called }
+            }
+            Err(fault) => fault,
+        }
+    }
+
+    /// Read variables of another type; all of them are stored as whole numbers.
+    ///
+    /// # Errors
+    /// Unknown references and other types.
+    pub fn get_whole(
+        &mut self,
+        references: &[u32],
+        called: &'static str,
+        is: impl Fn(Kind) -> bool,
+        mut put: impl FnMut(usize, f64),
+    ) -> Result<(), Fault> {
+        for reference in references {
+            if !is(self.variable(*reference)?.entry.kind) {
+                return Err(self.wrong_type(*reference, called));
+            }
+        }
+        for (i, reference) in references.iter().enumerate() {
+            put(i, self.state.values[*reference as usize]);
+        }
+        Ok(())
+    }
+
+    /// Set variables; all of them or, on a fault, none.
+    ///
+    /// # Errors
+    /// Unknown references, other types, values out of range, variables that cannot be set now.
+    pub fn set(
+        &mut self,
+        references: &[u32],
+        called: &'static str,
+        is: impl Fn(Kind) -> bool,
+        value: impl Fn(usize) -> f64,
+    ) -> Result<(), Fault> {
+        for (i, reference) in references.iter().enumerate() {
+            let Variable { name, entry, .. } = self.variable(*reference)?;
+            if !is(entry.kind) {
+                return Err(self.wrong_type(*reference, called));
+            }
+            if let Some(reason) = self.not_settable(entry) {
+                let phase = format!("{:?}", self.state.phase);
+                return Err(Fault::NotSettable { variable: name.clone(), phase, reason });
+            }
+            if !in_range(entry, value(i)) {
+                let kept = self.state.values[*reference as usize];
+                return Err(Fault::Value {
+                    variable: name.clone(),
+                    value: value(i),
+                    kept,
+                    allowed: allowed(entry),
+                });
+            }
+        }
+        for (i, reference) in references.iter().enumerate() {
+            self.accept(*reference as usize, value(i));
+        }
+        Ok(())
+    }
+
+    /// Take over a value that may be set; what depends on it is out of date.
+    fn accept(&mut self, i: usize, value: f64) {
+        let State { values, given, history, motion_start, model, fresh, retune, phase, .. } = &mut self.state;
+        if Layout::<M>::INPUTS.contains(&i) {
+            let given = &mut given[i - Layout::<M>::INPUTS.start];
+            if given.to_bits() != value.to_bits() {
+                *given = value;
+                history.unsettle();
+            }
+        } else if Layout::<M>::PORT.contains(&i) {
+            history.unsettle();
+        } else if Layout::<M>::MOTION.contains(&i) {
+            motion_start[i - Layout::<M>::MOTION.start] = value;
+            *model = None; // another start: assemble again
+        }
+        if values[i].to_bits() == value.to_bits() {
+            return;
+        }
+        values[i] = value;
+        *fresh &= !self.table.affects[i];
+        if Layout::<M>::PARAMETERS.contains(&i) {
+            if matches!(phase, Phase::Instantiated | Phase::InitializationMode) {
+                *model = None;
+            } else {
+                *retune = true;
+            }
+        }
+    }
+
+    fn not_settable(&self, entry: &Entry) -> Option<&'static str> {
+        let State { interface, phase, .. } = self.state;
+        let continuous_input =
+            entry.causality == Causality::Input && entry.variability == Variability::Continuous;
+        match phase {
+            Phase::Instantiated | Phase::InitializationMode if !entry.has_start() => {
+                Some("it is computed and has no start value")
+            }
+            Phase::StepMode | Phase::EventMode | Phase::ContinuousTimeMode if !changes_in_a_run(entry) => {
+                Some("only inputs and tunable parameters change in a run")
+            }
+            Phase::ContinuousTimeMode if !continuous_input => {
+                Some("only continuous inputs change between events; set it in Event Mode")
+            }
+            Phase::StepMode if interface == Interface::CoSimulationWithEvents && !continuous_input => {
+                Some("only continuous inputs change between steps where Event Mode is used; set it there")
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Number of references and number of values must agree.
+pub(crate) fn same_length(references: usize, values: usize) -> Result<(), Fault> {
+    if references == values { Ok(()) } else { Err(Fault::Length { references, values }) }
+}
+
+/// True if `value` may be set.
+#[allow(clippy::float_cmp, reason = "items are whole numbers")]
+fn in_range(entry: &Entry, value: f64) -> bool {
+    if let Kind::Enumeration(t) = entry.kind {
+        #[allow(clippy::cast_precision_loss, reason = "items are small")]
+        return t.items.iter().any(|i| i.value as f64 == value);
+    }
+    value.is_finite() && value >= entry.min && value <= entry.max
+}
