@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """CPU time of the paper's wheel suspension at equal error: SUNDIALS IDAS through CasADi against our FMU.
 
-    python -m venv out/bench && out/bench/bin/pip install -r scripts/requirements-bench.txt
-    out/bench/bin/python scripts/bench_idas.py
+    python3 -m venv /tmp/bench && /tmp/bench/bin/pip install -r scripts/requirements-bench.txt
+    /tmp/bench/bin/python scripts/bench_idas.py
 
 Needs scripts/build to have run, and a C compiler: CasADi writes its functions as C and compiles them, so that neither
 side is interpreted. Scene: 10 s of `wishbone_paper`, P.F.z = 10 sin(10 t) N. The error is the largest of the lower link's
@@ -189,10 +189,13 @@ def ours(fmu, samples, methods):
 
 
 def at_target(points):
-    """CPU time at the target error: the cheapest of all methods, each on the line through its points (log - log)."""
+    """CPU time at the target error per method, cheapest first: on the line (log - log) between two points around it, or
+    of the cheapest point where all are better than the target."""
     found = {}
     for method in dict.fromkeys(point.method for point in points):
         of = sorted((p for p in points if p.method == method), key=lambda p: -p.error)
+        if of[0].error < TARGET:
+            found[method] = min(p.cpu for p in of)
         for worse, better in zip(of, of[1:]):
             if worse.error >= TARGET >= better.error:
                 x = math.log(TARGET / better.error) / math.log(worse.error / better.error)
