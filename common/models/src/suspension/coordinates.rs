@@ -42,6 +42,22 @@ impl<S: Scalar> Orientation<S> {
         }
     }
 
+    /// Start values in the scalar of the equations.
+    pub(super) fn constant(start: &Orientation<f64>) -> Self {
+        let l = S::lift;
+        Self {
+            psi: l(start.psi),
+            phi: l(start.phi),
+            theta: l(start.theta),
+            psi_dot: l(start.psi_dot),
+            phi_dot: l(start.phi_dot),
+            theta_dot: l(start.theta_dot),
+            q: start.q.map(l),
+            direction: start.direction.map(l),
+            omega: start.omega.map(l),
+        }
+    }
+
     /// As the angles of a link.
     pub(super) fn link(self) -> LinkAngles<S> {
         let Self { theta, phi, theta_dot, phi_dot, .. } = self;
@@ -71,9 +87,9 @@ pub(super) trait Coordinates<const D: usize, const N: usize>: Joint<D, N> {
     fn carrier_states(&self, x: &mut [f64]) {
         self.link_states(0.0, 0.0, x);
     }
-    /// All orientation variables; those of other joint kinds have their start values. `carrier`: a
+    /// All orientation variables; those of other joint kinds as in `unused`. `carrier`: a
     /// single angle is psi, not theta.
-    fn orientation<S: Scalar>(&self, x: &[S], carrier: bool) -> Orientation<S>;
+    fn orientation<S: Scalar>(&self, x: &[S], carrier: bool, unused: Orientation<S>) -> Orientation<S>;
     /// The states from orientation variables; `carrier`: the angle is psi.
     fn states_of(&self, o: &Orientation<f64>, x: &mut [f64], carrier: bool);
 
@@ -110,11 +126,11 @@ pub(super) trait Coordinates<const D: usize, const N: usize>: Joint<D, N> {
 }
 
 /// One angle, of a carrier or of a link at the azimuth `phi`.
-fn single_angle<S: Scalar>(x: &[S], phi: S, carrier: bool) -> Orientation<S> {
+fn single_angle<S: Scalar>(x: &[S], phi: S, carrier: bool, unused: Orientation<S>) -> Orientation<S> {
     if carrier {
-        Orientation { psi: x[0], psi_dot: x[1], phi, ..Orientation::unused() }
+        Orientation { psi: x[0], psi_dot: x[1], phi, ..unused }
     } else {
-        Orientation { theta: x[0], theta_dot: x[1], phi, ..Orientation::unused() }
+        Orientation { theta: x[0], theta_dot: x[1], phi, ..unused }
     }
 }
 
@@ -131,8 +147,8 @@ impl Coordinates<2, 1> for Planar {
     fn link_states(&self, _: f64, theta: f64, x: &mut [f64]) {
         x.copy_from_slice(&[theta, 0.0]);
     }
-    fn orientation<S: Scalar>(&self, x: &[S], carrier: bool) -> Orientation<S> {
-        single_angle(x, S::lift(0.0), carrier)
+    fn orientation<S: Scalar>(&self, x: &[S], carrier: bool, unused: Orientation<S>) -> Orientation<S> {
+        single_angle(x, unused.phi, carrier, unused)
     }
     fn states_of(&self, o: &Orientation<f64>, x: &mut [f64], carrier: bool) {
         let states = if carrier { [o.psi, o.psi_dot] } else { [o.theta, o.theta_dot] };
@@ -184,25 +200,19 @@ impl Coordinates<3, 3> for Spatial {
             }
         }
     }
-    fn orientation<S: Scalar>(&self, x: &[S], carrier: bool) -> Orientation<S> {
+    fn orientation<S: Scalar>(&self, x: &[S], carrier: bool, unused: Orientation<S>) -> Orientation<S> {
         match self {
-            Self::Revolute { phi } => single_angle(x, S::lift(*phi), carrier),
-            Self::Universal => Orientation {
-                phi: x[0],
-                theta: x[1],
-                phi_dot: x[2],
-                theta_dot: x[3],
-                ..Orientation::unused()
-            },
-            Self::Spherical => Orientation {
-                q: [x[0], x[1], x[2], x[3]],
-                omega: Vector3::new(x[4], x[5], x[6]),
-                ..Orientation::unused()
-            },
+            Self::Revolute { phi } => single_angle(x, S::lift(*phi), carrier, unused),
+            Self::Universal => {
+                Orientation { phi: x[0], theta: x[1], phi_dot: x[2], theta_dot: x[3], ..unused }
+            }
+            Self::Spherical => {
+                Orientation { q: [x[0], x[1], x[2], x[3]], omega: Vector3::new(x[4], x[5], x[6]), ..unused }
+            }
             Self::SphericalRod => Orientation {
                 direction: Vector3::new(x[0], x[1], x[2]),
                 omega: Vector3::new(x[3], x[4], x[5]),
-                ..Orientation::unused()
+                ..unused
             },
         }
     }

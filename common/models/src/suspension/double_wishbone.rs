@@ -9,7 +9,7 @@ use model::{
     System, Vector3, Visitor,
 };
 
-use super::coordinates::Coordinates;
+use super::coordinates::{Coordinates, Orientation};
 use super::load::{LoadLaw, PulsePhase};
 use super::parameters::{
     ArmJoint, CarrierJoint, ClosureKind, ForceKind, Parameters, PreloadMode, SceneMotion, StabilisationKind,
@@ -379,7 +379,9 @@ where
         let k = self.kinematics(x)?;
         let mut states: [&[S]; 3] = [&[]; 3];
         self.assembly.each(x, |i, own| states[i] = own);
-        let orientation = |i: usize| self.assembly.members[i].joint.orientation(states[i], i == CARRIER);
+        let orientation = |i: usize| {
+            self.assembly.members[i].joint.orientation(states[i], i == CARRIER, Orientation::unused())
+        };
         let lower = orientation(LOWER).link();
         let world = |v: Vector<S, D>| Dim::<D>::embed(&v);
         let carrier = |p| k.elements.motion(CARRIER, p);

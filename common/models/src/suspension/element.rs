@@ -12,7 +12,7 @@
 use mechanics::{Body, Dim, Hinged, Load, Loaded, Point, Pose, Rigid, Scalar, Space, Vector};
 use model::{EvaluationError, SymmetricTensor, Vector3};
 
-use super::coordinates::Coordinates;
+use super::coordinates::{Coordinates, Orientation};
 use super::variables::{Root, Slot};
 
 /// Constants of an element.
@@ -22,6 +22,8 @@ pub(super) struct Element<J, const D: usize, const N: usize> {
     pub(super) rigid: Rigid<D>,
     pub(super) gravity: Option<Vector<f64, D>>,
     pub(super) energy: bool,
+    /// Start values of all orientation variables
+    pub(super) start: Orientation<f64>,
 }
 
 /// Motion of the root port in the element's space.
@@ -88,6 +90,11 @@ where
     /// Number of states without the energy integrals.
     pub(super) fn mechanical(&self) -> usize {
         self.joint.states()
+    }
+
+    /// All orientation variables; those of other joint kinds keep their start values.
+    pub(super) fn orientation<S: Scalar>(&self, x: &[S], carrier: bool) -> Orientation<S> {
+        self.joint.orientation(&x[..self.mechanical()], carrier, Orientation::constant(&self.start))
     }
 
     /// The element at the states `x` on its root.

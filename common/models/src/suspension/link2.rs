@@ -166,6 +166,20 @@ struct Rod<J, const D: usize, const N: usize> {
     r_B: Vector<f64, D>,
 }
 
+/// Orientation variables among the start values.
+fn given_orientation(given: &Motion<f64>) -> Orientation<f64> {
+    Orientation {
+        phi: given.phi,
+        theta: given.theta,
+        phi_dot: given.phi_dot,
+        theta_dot: given.theta_dot,
+        q: given.q,
+        direction: given.direction,
+        omega: given.omega,
+        ..Orientation::unused()
+    }
+}
+
 impl Model for Link2 {
     const NAME: &'static str = "link2";
     const DESCRIPTION: &'static str =
@@ -189,14 +203,14 @@ impl Model for Link2 {
         let rigid = p.rod.checked(free)?;
         let joint = match p.joint {
             LinkJoint::Planar => {
-                return Ok(Self { structure: Structure::Planar(Rod::new(p, Planar, &rigid)) });
+                return Ok(Self { structure: Structure::Planar(Rod::new(p, Planar, &rigid, start)) });
             }
             LinkJoint::Revolute => Spatial::Revolute { phi: start.phi },
             LinkJoint::Universal => Spatial::Universal,
             LinkJoint::Spherical => Spatial::Spherical,
             LinkJoint::SphericalRod => Spatial::SphericalRod,
         };
-        Ok(Self { structure: Structure::Spatial(Rod::new(p, joint, &rigid)) })
+        Ok(Self { structure: Structure::Spatial(Rod::new(p, joint, &rigid, start)) })
     }
 
     fn retune(&mut self, p: &Parameters) {
@@ -224,9 +238,15 @@ where
     J: Coordinates<D, N>,
     Dim<D>: Space<D>,
 {
-    fn new(p: &Parameters, joint: J, rigid: &Rigid<3>) -> Self {
+    fn new(p: &Parameters, joint: J, rigid: &Rigid<3>, start: &Motion<f64>) -> Self {
         let gravity = field(p.use_gravity, &p.gravity);
-        let element = Element { joint, rigid: restricted(rigid), gravity, energy: p.use_energy };
+        let element = Element {
+            joint,
+            rigid: restricted(rigid),
+            gravity,
+            energy: p.use_energy,
+            start: given_orientation(start),
+        };
         Self { element, r_B: Dim::<D>::restrict(&Vector3::new(p.rod.length, 0.0, 0.0)) }
     }
 
@@ -252,17 +272,7 @@ where
     fn start(&self, _t: f64, given: &Motion<f64>) -> Result<([f64; X], ()), ParameterError> {
         let mut x = [0.0; X];
         let own = &mut x[..self.element.mechanical()];
-        let orientation = Orientation {
-            phi: given.phi,
-            theta: given.theta,
-            phi_dot: given.phi_dot,
-            theta_dot: given.theta_dot,
-            q: given.q,
-            direction: given.direction,
-            omega: given.omega,
-            ..Orientation::unused()
-        };
-        self.element.joint.checked_start(&orientation, own, false)?;
+        self.element.joint.checked_start(&given_orientation(given), own, false)?;
         Ok((x, ()))
     }
 
@@ -294,7 +304,7 @@ where
         _d: &(),
     ) -> Result<Motion<S>, EvaluationError> {
         let at = self.element.pose(x, &u.A);
-        let o = self.element.joint.orientation(&x[..self.element.mechanical()], false);
+        let o = self.element.orientation(x, false);
         let (B_r, B_v) = at.motion(&at.pose.point(&self.r_B));
         Ok(Motion {
             theta: o.theta,

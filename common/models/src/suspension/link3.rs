@@ -237,6 +237,21 @@ struct Carrier<J, const D: usize, const N: usize> {
     load: Option<LoadLaw<D>>,
 }
 
+/// Orientation variables among the start values.
+fn given_orientation(given: &Motion<f64>) -> Orientation<f64> {
+    Orientation {
+        psi: given.psi,
+        psi_dot: given.psi_dot,
+        phi: given.phi,
+        theta: given.theta,
+        phi_dot: given.phi_dot,
+        theta_dot: given.theta_dot,
+        q: given.q,
+        omega: given.omega,
+        ..Orientation::unused()
+    }
+}
+
 impl Model for Link3 {
     const NAME: &'static str = "link3";
     const DESCRIPTION: &'static str =
@@ -254,17 +269,17 @@ impl Model for Link3 {
         let structure = match p.joint {
             BodyJoint::Planar => {
                 positive_inertia("inertia", p.inertia.yy)?;
-                Structure::Planar(Carrier::new(p, Planar))
+                Structure::Planar(Carrier::new(p, Planar, start))
             }
             BodyJoint::Revolute => {
                 check_inertia("inertia", &p.inertia)?;
-                Structure::Spatial(Carrier::new(p, Spatial::Revolute { phi: start.phi }))
+                Structure::Spatial(Carrier::new(p, Spatial::Revolute { phi: start.phi }, start))
             }
             BodyJoint::Universal | BodyJoint::Spherical => {
                 check_inertia("inertia", &p.inertia)?;
                 let universal = p.joint == BodyJoint::Universal;
                 let joint = if universal { Spatial::Universal } else { Spatial::Spherical };
-                Structure::Spatial(Carrier::new(p, joint))
+                Structure::Spatial(Carrier::new(p, joint, start))
             }
         };
         Ok(Self { structure })
@@ -294,7 +309,7 @@ where
     J: Coordinates<D, N>,
     Dim<D>: Space<D>,
 {
-    fn new(p: &Parameters, joint: J) -> Self {
+    fn new(p: &Parameters, joint: J, start: &Motion<f64>) -> Self {
         let (root, tip) = match p.root {
             BodyRoot::B => (Vector3::zeros(), p.C),
             BodyRoot::C => (p.C, Vector3::zeros()),
@@ -307,6 +322,7 @@ where
                 rigid,
                 gravity: field(p.use_gravity, &p.gravity),
                 energy: p.use_energy,
+                start: given_orientation(start),
             },
             r_C: part(tip - root),
             r_P: part(p.P - root),
@@ -345,18 +361,11 @@ where
 
     fn start(&self, t: f64, given: &Motion<f64>) -> Result<([f64; X], PulsePhase), ParameterError> {
         let mut x = [0.0; X];
-        let orientation = Orientation {
-            psi: given.psi,
-            psi_dot: given.psi_dot,
-            phi: given.phi,
-            theta: given.theta,
-            phi_dot: given.phi_dot,
-            theta_dot: given.theta_dot,
-            q: given.q,
-            omega: given.omega,
-            ..Orientation::unused()
-        };
-        self.element.joint.checked_start(&orientation, &mut x[..self.element.mechanical()], true)?;
+        self.element.joint.checked_start(
+            &given_orientation(given),
+            &mut x[..self.element.mechanical()],
+            true,
+        )?;
         Ok((x, self.phase(t)))
     }
 
@@ -394,7 +403,7 @@ where
     ) -> Result<Motion<S>, EvaluationError> {
         let at = self.element.pose(x, &u.B);
         let own = &x[..self.element.mechanical()];
-        let o = self.element.joint.orientation(own, true);
+        let o = self.element.orientation(x, true);
         let (C_r, C_v) = at.motion(&at.pose.point(&self.r_C));
         let (P_r, P_v) = at.motion(&at.pose.point(&self.r_P));
         Ok(Motion {

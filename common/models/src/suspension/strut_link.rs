@@ -244,6 +244,19 @@ struct StrutRod<J, const D: usize, const N: usize> {
     strut: SpringDamper,
 }
 
+/// Orientation variables among the start values.
+fn given_orientation(given: &Motion<f64>) -> Orientation<f64> {
+    Orientation {
+        phi: given.phi,
+        theta: given.theta,
+        phi_dot: given.phi_dot,
+        theta_dot: given.theta_dot,
+        q: given.q,
+        omega: given.omega,
+        ..Orientation::unused()
+    }
+}
+
 impl Model for StrutLink {
     const NAME: &'static str = "strut_link";
     const DESCRIPTION: &'static str = "Rigid rod with a spring-damper to the chassis, follower port D at its joint and leader port C at its tip";
@@ -264,11 +277,11 @@ impl Model for StrutLink {
         let turning = if p.joint == StrutJoint::Spherical { Turning::Free } else { Turning::OneAxis };
         let rigid = p.rod.checked(turning)?;
         let structure = match p.joint {
-            StrutJoint::Planar => Structure::Planar(StrutRod::new(p, Planar, &rigid)),
+            StrutJoint::Planar => Structure::Planar(StrutRod::new(p, Planar, &rigid, start)),
             StrutJoint::Revolute => {
-                Structure::Spatial(StrutRod::new(p, Spatial::Revolute { phi: start.phi }, &rigid))
+                Structure::Spatial(StrutRod::new(p, Spatial::Revolute { phi: start.phi }, &rigid, start))
             }
-            StrutJoint::Spherical => Structure::Spatial(StrutRod::new(p, Spatial::Spherical, &rigid)),
+            StrutJoint::Spherical => Structure::Spatial(StrutRod::new(p, Spatial::Spherical, &rigid, start)),
         };
         Ok(Self { structure })
     }
@@ -299,7 +312,7 @@ where
     J: Coordinates<D, N>,
     Dim<D>: Space<D>,
 {
-    fn new(p: &Parameters, joint: J, rigid: &Rigid<3>) -> Self {
+    fn new(p: &Parameters, joint: J, rigid: &Rigid<3>, start: &Motion<f64>) -> Self {
         let along = |x: f64| Dim::<D>::restrict(&Vector3::new(x, 0.0, 0.0));
         let (root, tip) = match p.root {
             StrutRoot::D => (0.0, p.rod.length),
@@ -308,7 +321,13 @@ where
         let rigid: Rigid<D> = restricted(rigid);
         let rigid = Rigid { c: rigid.c - along(root), ..rigid };
         let mut rod = Self {
-            element: Element { joint, rigid, gravity: None, energy: p.use_energy },
+            element: Element {
+                joint,
+                rigid,
+                gravity: None,
+                energy: p.use_energy,
+                start: given_orientation(start),
+            },
             r_tip: along(tip - root),
             r_S: along(p.s1 - root),
             strut: SpringDamper { k: 0.0, c: None, l0: p.l0, F_pre: 0.0 },
@@ -355,16 +374,11 @@ where
 
     fn start(&self, _t: f64, given: &Motion<f64>) -> Result<([f64; X], ()), ParameterError> {
         let mut x = [0.0; X];
-        let orientation = Orientation {
-            phi: given.phi,
-            theta: given.theta,
-            phi_dot: given.phi_dot,
-            theta_dot: given.theta_dot,
-            q: given.q,
-            omega: given.omega,
-            ..Orientation::unused()
-        };
-        self.element.joint.checked_start(&orientation, &mut x[..self.element.mechanical()], false)?;
+        self.element.joint.checked_start(
+            &given_orientation(given),
+            &mut x[..self.element.mechanical()],
+            false,
+        )?;
         Ok((x, ()))
     }
 
@@ -397,7 +411,7 @@ where
         _d: &(),
     ) -> Result<Motion<S>, EvaluationError> {
         let at = self.element.pose(x, &u.D);
-        let o = self.element.joint.orientation(&x[..self.element.mechanical()], false);
+        let o = self.element.orientation(x, false);
         let (C_r, C_v) = at.motion(&at.pose.point(&self.r_tip));
         let (_, strut) = self.strut(&at, u)?;
         Ok(Motion {
