@@ -178,6 +178,37 @@ def test_bushing_with_small_explicit_steps(wishbone, name, k, c, step):
     assert error["D.F.x"].largest <= 0.04, error.table()
 
 
+# stiffness, damping, distance of theta1 from the rigid joint over 1 s [rad] as published
+STIFF_BUSHINGS = [("1e8", 1e8, 1e4, 2.35e-5), ("2.2e10", 2.2e10, 2e5, 1.07e-7)]
+
+
+@pytest.mark.parametrize(("name", "k", "c", "distance"), STIFF_BUSHINGS)
+def test_bushing_with_radau5(wishbone, name, k, c, distance):
+    """rtol 1e-7: theta1 within 2e-6 rad in at most 5000 steps, near the rigid joint as far as it should be."""
+    reference = Reference.named(f"oracle_bushing_{name}")
+    tolerance = scenes.adaptive("radau5", 1e-7)
+    result = simulate(wishbone, reference, {**scenes.bushing(k, c), **tolerance}, H=0.01)
+    error = reference.error_of(result)
+    assert error[THETA].largest <= min(2e-6, 0.2 * distance), error.table()
+    assert result.counts["solver.steps"] <= 500, result.counts  # (256, 425)
+    rigid = wishbone.run({**scenes.LOAD200, **tolerance}, H=0.01, stop=1.0, outputs=[THETA])
+    assert np.abs(result[THETA] - rigid[THETA]).max() == pytest.approx(distance, rel=0.15)
+
+
+@pytest.mark.parametrize(("name", "k", "c", "rtol"), [("1e8", 1e8, 1e4, 1e-7), ("2.2e10", 2.2e10, 2e5, 1e-5)])
+def test_bushing_with_rodas4(wishbone, name, k, c, rtol):
+    """theta1 within 2e-6 rad in at most 5000 steps (4790; 3896).
+
+    A Rosenbrock method loses order on stiff springs between masses: at 2.2e10 N/m rtol 1e-7 would take 32500 steps, for an
+    error of 9e-11 rad; radau5 is the method for them.
+    """
+    reference = Reference.named(f"oracle_bushing_{name}")
+    result = simulate(wishbone, reference, {**scenes.bushing(k, c), **scenes.adaptive("rodas4", rtol)}, H=0.01)
+    error = reference.error_of(result)
+    assert error[THETA].largest <= 2e-6, error.table()
+    assert result.counts["solver.steps"] <= 5000, result.counts
+
+
 # Largest error of theta1 [rad], loop gap [m], gap rate [m/s] over 10 s; a separate program's values.
 # A projected gap is rounding: a few 1e-16 of lengths below 1 m.
 ROUNDING = 1e-15
