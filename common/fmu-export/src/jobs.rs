@@ -19,9 +19,6 @@ use crate::inputs::Polynomials;
 /// States that are off their manifold by more are brought back at an event.
 const OFF_MANIFOLD: f64 = 1e-8;
 
-/// Half the difference of times by which the rates of moving inputs are taken [s]
-const INPUT_DIFFERENCE: f64 = 1e-4;
-
 /// Largest number of updates for events at one time.
 const MAX_UPDATES: usize = 100;
 
@@ -235,13 +232,7 @@ impl<const N: usize, const Z: usize, Y: System<N, Z>> Ode<N> for Driven<'_, N, Z
         let Course { polynomials, u } = &mut *course;
         polynomials.evaluate(t, u);
         let by_state = state_jacobian(self.system, t, x, u, duals, &self.d)?;
-        // rates of the inputs by central differences of their polynomials
-        for (sign, at) in [(1.0, t + INPUT_DIFFERENCE), (-1.0, t - INPUT_DIFFERENCE)] {
-            polynomials.evaluate(at, u);
-            for (dual, u) in duals.iter_mut().zip(u.iter()) {
-                dual.eps += sign * u / (2.0 * INPUT_DIFFERENCE);
-            }
-        }
+        polynomials.evaluate(Dual64::new(t, 1.0), duals);
         self.with_time_derivative(t, x, &by_state, duals)
     }
     #[inline]

@@ -70,6 +70,18 @@ impl<M: Model> Named<M> {
         Ok(value[0])
     }
 
+    /// Read a counter.
+    ///
+    /// # Panics
+    /// If it cannot be read.
+    #[must_use]
+    pub fn count(&mut self, name: &str) -> f64 {
+        let mut count = f64::NAN;
+        let references = [self.reference(name)];
+        self.instance.get_whole(&references, "test", |_| true, |_, value| count = value).expect("a counter");
+        count
+    }
+
     /// Through initialisation.
     ///
     /// # Errors

@@ -1,5 +1,7 @@
 //! The polynomials that inputs follow over one step.
 
+use model::Scalar;
+
 use super::history::identical;
 use super::{Bounds, Channels, History, InputTreatment, Motion, PortParameters};
 
@@ -41,16 +43,16 @@ impl Polynomials {
         self.newton.is_empty() && self.powers.is_empty()
     }
 
-    /// Write the moving inputs at `t`.
+    /// Write the moving inputs at `t`; for dual numbers `t + 1 eps` with their rates.
     #[inline]
-    pub(crate) fn evaluate(&self, t: f64, u: &mut [f64]) {
+    pub(crate) fn evaluate<S: Scalar>(&self, t: S, u: &mut [S]) {
         let [d_0, d_1, d_2] = self.nodes.map(|node| t - node);
         for (i, [f_0, f_01, f_012, f_0123]) in &self.newton {
-            u[*i] = f_0 + d_0 * (f_01 + d_1 * (f_012 + d_2 * f_0123));
+            u[*i] = d_0 * (d_1 * (d_2 * *f_0123 + *f_012) + *f_01) + *f_0;
         }
         let d = t - self.from;
         for (i, c) in &self.powers {
-            u[*i] = c.iter().rev().fold(0.0, |sum, c| sum * d + c);
+            u[*i] = c.iter().rev().fold(S::lift(0.0), |sum, c| sum * d + *c);
         }
     }
 
