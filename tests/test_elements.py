@@ -634,6 +634,7 @@ AT_THE_END = [
     ("link3", {"joint.kind": "spherical", "orientation.q[2]": 0.1}, "orientation.q"),
     ("strut_link", {"joint.kind": "spherical", "orientation.q[1]": 0.0}, "orientation.q"),
     ("link2", {"joint.kind": "universal", "inertia.xx": 0.0}, "inertia.xx"),
+    ("link2", {"joint.kind": "spherical", "orientation.q[1]": 1.0, "inertia.xx": 0.0}, "inertia.xx"),
     ("strut_link", {"strut.s1": 0.3}, "strut.s1"),
     ("link2", {"joint.kind": "spherical_rod", "direction.y": 0.1}, "direction"),
     ("link2", {"joint.kind": "spherical_rod", "omega.x": 1.0}, "omega"),

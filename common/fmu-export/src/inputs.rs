@@ -70,12 +70,8 @@ impl PortParameters {
         if (low..=high).contains(&self.order) {
             return Ok(self);
         }
-        Err(ParameterError::Refused {
-            variable: "port.order",
-            value: f64::from(self.order),
-            reason: format!("port.inputs = {name}"),
-            allowed: format!("{low} .. {high}"),
-        })
+        let (reason, allowed) = (format!("port.inputs = {name}"), format!("{low} .. {high}"));
+        Err(ParameterError::refused("port.order", f64::from(self.order), reason, allowed))
     }
 
     /// Number of nodes of the polynomials.

@@ -59,3 +59,10 @@ impl Space<3> for Dim<3> {
         (e.eigenvalues, e.eigenvectors)
     }
 }
+
+/// Length of a vector, smooth enough at zero for dual numbers.
+#[inline]
+pub fn magnitude<S: Scalar, const D: usize>(v: &Vector<S, D>) -> S {
+    let squared = v.dot(v);
+    if squared.re().vanishes() { S::lift(0.0) } else { squared.sqrt() }
+}

@@ -47,3 +47,15 @@ pub enum ParameterError {
     #[error("no consistent start: {0}")]
     Start(#[from] EvaluationError),
 }
+
+impl ParameterError {
+    /// One value excludes the others.
+    pub fn refused(
+        variable: &'static str,
+        value: f64,
+        reason: impl Into<String>,
+        allowed: impl Into<String>,
+    ) -> Self {
+        Self::Refused { variable, value, reason: reason.into(), allowed: allowed.into() }
+    }
+}

@@ -4,7 +4,6 @@
 use mechanics::{Joint, Planar, Rigid, Scalar, Spatial};
 use model::{ParameterError, Vector3};
 
-use super::double_wishbone::refused;
 use super::variables::{CarrierOrientation, LinkAngles};
 
 /// Start values may be off their manifold by this much.
@@ -113,7 +112,7 @@ pub(super) trait Coordinates<const D: usize, const N: usize>: Joint<D, N> {
             } else {
                 ("direction", "a norm within 1e-6 of 1, and omega across it")
             };
-            return Err(refused(name, off, "off its manifold by this much", allowed));
+            return Err(ParameterError::refused(name, off, "off its manifold by this much", allowed));
         }
         self.normalise(x);
         Ok(())

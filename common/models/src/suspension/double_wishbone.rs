@@ -1,8 +1,8 @@
 //! The double wishbone as a model: parameters checked, structure chosen, equations in named groups.
 
 use mechanics::{
-    Assembly, Baumgarte, ClosingJoint, Dim, Member, Parent, Place, Planar, Rigid, Scalar, Space, Spatial,
-    SpringDamper, Vector, conditioning,
+    Assembly, ClosingJoint, Dim, Member, Parent, Place, Planar, Rigid, Scalar, Space, Spatial, SpringDamper,
+    Vector, conditioning, magnitude,
 };
 use model::{
     Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, Spectrum, SymmetricTensor,
@@ -10,6 +10,7 @@ use model::{
 };
 
 use super::coordinates::{Coordinates, Orientation};
+use super::inertia::{check_inertia, positive_inertia};
 use super::load::{LoadLaw, PulsePhase};
 use super::parameters::{
     ArmJoint, CarrierJoint, ClosureKind, ForceKind, Parameters, PreloadMode, SceneMotion, StabilisationKind,
@@ -116,20 +117,11 @@ impl Model for DoubleWishbone {
     }
 
     fn for_model_exchange(&mut self) {
-        let terms = Baumgarte { a: self.parameters.stabilisation_a, b: self.parameters.stabilisation_b };
+        let terms = self.parameters.stabilisation.terms();
         each!(&mut self.structure, w => if let Closing::Projection = w.closing {
             w.closing = Closing::Baumgarte(terms);
         });
     }
-}
-
-pub(super) fn refused(
-    variable: &'static str,
-    value: f64,
-    reason: impl Into<String>,
-    allowed: impl Into<String>,
-) -> ParameterError {
-    ParameterError::Refused { variable, value, reason: reason.into(), allowed: allowed.into() }
 }
 
 /// Conditions between parameters.
@@ -139,7 +131,7 @@ fn check(p: &Parameters) -> Result<(), ParameterError> {
         if length > 1e-6 && length.is_finite() {
             return Ok(length);
         }
-        Err(refused(
+        Err(ParameterError::refused(
             name[1],
             length,
             format!("its distance to {} is this many metres", name[0]),
@@ -150,7 +142,7 @@ fn check(p: &Parameters) -> Result<(), ParameterError> {
     between(["design.B", "design.C"], &p.B, &p.C)?;
     let upper = between(["design.D", "design.C"], &p.D, &p.C)?;
     if p.s1 > upper {
-        return Err(refused(
+        return Err(ParameterError::refused(
             "strut.s1",
             p.s1,
             "S must lie on the upper link",
@@ -169,36 +161,17 @@ fn check(p: &Parameters) -> Result<(), ParameterError> {
         ];
         for (name, point) in points {
             if !point.y.vanishes() {
-                return Err(refused(name, point.y, "scene.motion = planar moves in x-z", "0"));
+                return Err(ParameterError::refused(
+                    name,
+                    point.y,
+                    "scene.motion = planar moves in x-z",
+                    "0",
+                ));
             }
         }
         return positive_inertia("carrier.inertia", p.carrier_inertia.yy);
     }
     check_inertia("carrier.inertia", &p.carrier_inertia)
-}
-
-/// A tensor that a rigid body can have.
-pub(super) fn check_inertia(
-    name: &'static str,
-    inertia: &SymmetricTensor<f64>,
-) -> Result<(), ParameterError> {
-    let moments = inertia.matrix().symmetric_eigenvalues();
-    positive_inertia(name, moments.min())?;
-    let largest = moments.max();
-    let excess = 2.0 * largest - moments.sum();
-    if excess > 1e-12 * largest {
-        let reason =
-            format!("the largest principal moment exceeds the sum of the others by {excess:.3e} kg.m2");
-        return Err(refused(name, largest, reason, "principal moments that satisfy the triangle inequality"));
-    }
-    Ok(())
-}
-
-pub(super) fn positive_inertia(name: &'static str, smallest: f64) -> Result<(), ParameterError> {
-    if smallest > 0.0 {
-        return Ok(());
-    }
-    Err(refused(name, smallest, "the smallest principal moment is not positive", "positive definite"))
 }
 
 /// Azimuth and elevation of a link vector; in the plane the azimuth is zero.
@@ -250,7 +223,6 @@ where
         let bushed = p.closure == ClosureKind::Bushing;
         let joints = [arm(design_lower.0), carrier, arm(design_upper.0)];
         let root = along(if bushed { L_3 } else { 0.0 });
-        let baumgarte = Baumgarte { a: p.stabilisation_a, b: p.stabilisation_b };
         let mut w = Self {
             assembly: Self::elements(p, joints, bushed),
             rigid: Self::elements(p, joints, false),
@@ -271,10 +243,10 @@ where
             }),
             gravity: None,
             load: (p.force_kind == ForceKind::Internal).then(|| LoadLaw::new(&p.force)),
-            closing: match (p.closure, p.stabilisation) {
+            closing: match (p.closure, p.stabilisation.kind) {
                 (ClosureKind::Bushing, _) => Closing::Bushing { k: p.closure_k, c: p.closure_c },
                 (_, StabilisationKind::None) => Closing::Rigid,
-                (_, StabilisationKind::Baumgarte) => Closing::Baumgarte(baumgarte),
+                (_, StabilisationKind::Baumgarte) => Closing::Baumgarte(p.stabilisation.terms()),
                 (_, StabilisationKind::Projection) => Closing::Projection,
             },
             energy: p.use_energy,
@@ -321,7 +293,12 @@ where
         ] {
             if value != default {
                 let reason = "the start follows from the design points while start.override = false";
-                return Err(refused(variable, value, reason, format!("{default}, or start.override = true")));
+                return Err(ParameterError::refused(
+                    variable,
+                    value,
+                    reason,
+                    format!("{default}, or start.override = true"),
+                ));
             }
         }
         self.design_states(x);
@@ -500,10 +477,4 @@ where
     fn update(&self, t: f64, _x: &mut [f64; X], _u: &Inputs<f64>, _d: &PulsePhase) -> PulsePhase {
         self.phase(t)
     }
-}
-
-/// Length of a vector, smooth enough at zero for dual numbers.
-pub(super) fn magnitude<S: Scalar, const D: usize>(v: &Vector<S, D>) -> S {
-    let squared = v.dot(v);
-    if squared.re().vanishes() { S::lift(0.0) } else { squared.sqrt() }
 }

@@ -9,17 +9,16 @@
 //! passed with the minimum-norm closing force.
 
 use mechanics::{
-    Assembly, Baumgarte, ClosingJoint, Member, Parent, Place, Planar, Scalar, Vector, conditioning,
+    Assembly, Baumgarte, ClosingJoint, Member, Parent, Place, Planar, Scalar, Vector, conditioning, magnitude,
 };
 use model::{
     Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, System, Variables, Vector3,
     Visitor,
 };
 
-use super::double_wishbone::{magnitude, refused};
 use super::element::field;
 use super::linkage::{Energy, Held, Linkage, PlanarRod, check_plane, length, plane, world};
-use super::parameters::StabilisationKind;
+use super::parameters::StabilisationParameters;
 use super::variables::Slot;
 
 /// Parameters of the four-bar linkage. Defaults: the Grashof crank-rocker of the reference.
@@ -50,15 +49,9 @@ pub struct Parameters {
     #[var(prefix = "rocker.", start = [0.8, true, 0.2, 0.010_666_666_666_666_6])]
     #[allow(missing_docs, reason = "a group")]
     pub rocker: PlanarRod,
-    /// How drift of the closed loop is held
-    #[var(name = "stabilisation.kind", item = StabilisationKind::Projection)]
-    pub stabilisation: StabilisationKind,
-    /// Baumgarte constant a [1/s]
-    #[var(name = "stabilisation.a", start = 20.0, min = 0.0)]
-    pub stabilisation_a: f64,
-    /// Baumgarte constant b [1/s]
-    #[var(name = "stabilisation.b", start = 20.0, min = 0.0)]
-    pub stabilisation_b: f64,
+    #[var(prefix = "stabilisation.")]
+    #[allow(missing_docs, reason = "a group")]
+    pub stabilisation: StabilisationParameters,
     /// Gravity [m/s2]
     #[var(name = "gravity", start = [0.0, 0.0, -9.80665], tunable)]
     pub gravity: Vector3<f64>,
@@ -223,11 +216,11 @@ impl Model for FourBar {
                 element: COUPLER,
                 point: Vector::<f64, 2>::new(axis.dot(&r_BP), axis.x * r_BP.y - axis.y * r_BP.x),
             },
-            held: Held::new(p.stabilisation, p.stabilisation_a, p.stabilisation_b),
+            held: Held::new(&p.stabilisation),
             energy: p.use_energy,
             start: [p.B - p.A, p.C - p.B, p.C - p.D].map(|r| r.z.atan2(r.x)),
         };
-        Ok(Self(linkage, Baumgarte { a: p.stabilisation_a, b: p.stabilisation_b }))
+        Ok(Self(linkage, p.stabilisation.terms()))
     }
 
     fn retune(&mut self, p: &Parameters) {
@@ -252,7 +245,7 @@ impl System<9, 0> for FourBar {
         let mut x = [crank, given.crank_rate, coupler, 0.0, rocker, 0.0, 0.0, 0.0, 0.0];
         self.0.assembly.close_loops(&mut x[..6], |n| self.0.roots[n], CRANK).map_err(|error| {
             let reason = format!("no rates of coupler and rocker belong to it: {error}");
-            refused(
+            ParameterError::refused(
                 "crank.angle_rate.theta",
                 given.crank_rate,
                 reason,

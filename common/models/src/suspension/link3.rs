@@ -15,8 +15,8 @@ use model::{
 };
 
 use super::coordinates::{Coordinates, Orientation};
-use super::double_wishbone::{check_inertia, positive_inertia};
 use super::element::{Element, LoadAt, PosedOf, element_functions, field, tensor};
+use super::inertia::{check_inertia, positive_inertia};
 use super::load::{LoadLaw, PulsePhase};
 use super::parameters::{ForceKind, LoadParameters};
 use super::variables::{ElementEnergy as Energy, Root, Slot};

@@ -9,8 +9,7 @@ use mechanics::{
 };
 use model::{EvaluationError, ParameterError, Variables, Vector3};
 
-use super::double_wishbone::refused;
-use super::parameters::StabilisationKind;
+use super::parameters::{StabilisationKind, StabilisationParameters};
 use super::variables::Slot;
 use super::wishbone::slots;
 
@@ -38,10 +37,20 @@ impl PlanarRod {
         let Self { mass: m, uniform, com, Iyy } = *self;
         let (c, Iyy) = if uniform { (0.5 * length, m * length * length / 12.0) } else { (com, Iyy) };
         if c > length {
-            return Err(refused(name, c, "the centre of mass lies on the rod", format!("0 .. {length} m")));
+            return Err(ParameterError::refused(
+                name,
+                c,
+                "the centre of mass lies on the rod",
+                format!("0 .. {length} m"),
+            ));
         }
         if Iyy + m * c * c <= 0.0 {
-            return Err(refused(name, c, "the inertia about the joint vanishes", "> 0, or inertia.yy > 0"));
+            return Err(ParameterError::refused(
+                name,
+                c,
+                "the inertia about the joint vanishes",
+                "> 0, or inertia.yy > 0",
+            ));
         }
         let mut I_c = Matrix::<f64, 3, 3>::zeros();
         I_c[(1, 1)] = Iyy;
@@ -100,10 +109,10 @@ pub(super) enum Held {
 }
 
 impl Held {
-    pub(super) fn new(kind: StabilisationKind, a: f64, b: f64) -> Self {
-        match kind {
+    pub(super) fn new(p: &StabilisationParameters) -> Self {
+        match p.kind {
             StabilisationKind::None => Self::Not,
-            StabilisationKind::Baumgarte => Self::Baumgarte(Baumgarte { a, b }),
+            StabilisationKind::Baumgarte => Self::Baumgarte(p.terms()),
             StabilisationKind::Projection => Self::Projection,
         }
     }
@@ -151,7 +160,7 @@ pub(super) fn plane(v: &Vector3<f64>) -> Vector<f64, 2> {
 /// Points of a planar linkage must lie in the plane.
 pub(super) fn check_plane(points: &[(&'static str, &Vector3<f64>)]) -> Result<(), ParameterError> {
     match points.iter().find(|(_, p)| !p.y.vanishes()) {
-        Some((name, p)) => Err(refused(name, p.y, "the linkage moves in x-z", "0")),
+        Some((name, p)) => Err(ParameterError::refused(name, p.y, "the linkage moves in x-z", "0")),
         None => Ok(()),
     }
 }
@@ -162,7 +171,12 @@ pub(super) fn length(name: &'static str, a: &Vector3<f64>, b: &Vector3<f64>) -> 
     if length > 1e-6 {
         return Ok(length);
     }
-    Err(refused(name, length, "the distance to its neighbour is this many metres", "distance > 1e-6 m"))
+    Err(ParameterError::refused(
+        name,
+        length,
+        "the distance to its neighbour is this many metres",
+        "distance > 1e-6 m",
+    ))
 }
 
 fn named(error: AssemblyError) -> EvaluationError {

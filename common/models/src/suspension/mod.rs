@@ -14,6 +14,7 @@ pub mod double_pendulum;
 mod double_wishbone;
 mod element;
 pub mod four_bar;
+mod inertia;
 pub mod link2;
 pub mod link3;
 mod linkage;
@@ -34,7 +35,7 @@ pub use linkage::PlanarRod;
 pub use load::PulsePhase;
 pub use parameters::{
     ArmJoint, CarrierJoint, ClosureKind, ForceKind, LoadParameters, Parameters, PreloadMode, SceneMotion,
-    StabilisationKind,
+    StabilisationKind, StabilisationParameters,
 };
 pub use rod::RodParameters;
 pub use strut_link::StrutLink;

@@ -1,5 +1,6 @@
 //! Parameters of the double wishbone. Defaults: the reference case `wishbone_paper`.
 
+use mechanics::Baumgarte;
 use model::{Enumeration, SymmetricTensor, Variables, Vector3};
 
 /// Motion of the scene
@@ -65,6 +66,28 @@ pub enum StabilisationKind {
     Baumgarte = 2,
     /// Projection of positions and velocities after every step (20)
     Projection = 3,
+}
+
+/// Stabilisation of the closed loop.
+#[derive(Debug, Clone, Copy, PartialEq, Variables)]
+#[variables(parameter)]
+pub struct StabilisationParameters {
+    /// How drift of the closed loop is held
+    #[var(name = "kind", item = StabilisationKind::Projection)]
+    pub kind: StabilisationKind,
+    /// Baumgarte constant a; choose a times the inner step below 1 [1/s]
+    #[var(name = "a", start = 20.0, min = 0.0)]
+    pub a: f64,
+    /// Baumgarte constant b [1/s]
+    #[var(name = "b", start = 20.0, min = 0.0)]
+    pub b: f64,
+}
+
+impl StabilisationParameters {
+    /// The terms of (19).
+    pub(super) fn terms(&self) -> Baumgarte {
+        Baumgarte { a: self.a, b: self.b }
+    }
 }
 
 /// Parameters of the internal load.
@@ -210,15 +233,9 @@ pub struct Parameters {
     #[var(name = "closure.c", start = 1e4, min = 0.0)]
     pub closure_c: f64,
 
-    /// How drift of the closed loop is held
-    #[var(name = "stabilisation.kind", item = StabilisationKind::Projection)]
-    pub stabilisation: StabilisationKind,
-    /// Baumgarte constant a; choose a times the inner step below 1 [1/s]
-    #[var(name = "stabilisation.a", start = 20.0, min = 0.0)]
-    pub stabilisation_a: f64,
-    /// Baumgarte constant b [1/s]
-    #[var(name = "stabilisation.b", start = 20.0, min = 0.0)]
-    pub stabilisation_b: f64,
+    #[var(prefix = "stabilisation.")]
+    #[allow(missing_docs, reason = "a group")]
+    pub stabilisation: StabilisationParameters,
 
     /// Tie rod between carrier and chassis
     #[var(name = "use.tie", start = false)]

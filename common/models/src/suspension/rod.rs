@@ -3,8 +3,6 @@
 use mechanics::Rigid;
 use model::{ParameterError, SymmetricTensor, Variables, Vector3};
 
-use super::double_wishbone::refused;
-
 /// Mass and shape of a rod.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
 #[variables(parameter)]
@@ -21,7 +19,7 @@ pub struct RodParameters {
     /// Distance from the joint to the centre of mass; only with rod.uniform false [m]
     #[var(name = "com.x", start = 0.200_249_843_945_007_86, min = 0.0)]
     pub com: f64,
-    /// Inertia about the rod's own axis; > 0 with joint.kind universal [kg.m2]
+    /// Inertia about the rod's own axis; > 0 with joint.kind universal and spherical [kg.m2]
     #[var(name = "inertia.xx", start = 2e-3, min = 0.0)]
     pub Ixx: f64,
     /// Inertia about the centre of mass, y axis; only with rod.uniform false [kg.m2]
@@ -55,7 +53,7 @@ impl RodParameters {
         let across = m * length * length / 12.0;
         let (c, Iyy, Izz) = if uniform { (0.5 * length, across, across) } else { (com, Iyy, Izz) };
         if c > length {
-            return Err(refused(
+            return Err(ParameterError::refused(
                 "com.x",
                 c,
                 "the centre of mass lies on the rod",
@@ -63,24 +61,25 @@ impl RodParameters {
             ));
         }
         if Iyy + m * c * c <= 0.0 {
-            return Err(refused(
+            return Err(ParameterError::refused(
                 "inertia.yy",
                 Iyy,
                 "the inertia about the joint vanishes",
                 "> 0, or com.x > 0",
             ));
         }
-        if turning == Turning::Universal && Ixx <= 0.0 {
-            return Err(refused(
-                "inertia.xx",
-                Ixx,
-                "the universal joint needs it near the vertical",
-                "> 0 kg.m2",
-            ));
+        if matches!(turning, Turning::Universal | Turning::Free) && Ixx <= 0.0 {
+            let reason = "this joint.kind turns the rod about its own axis too, spherical_rod does not";
+            return Err(ParameterError::refused("inertia.xx", Ixx, reason, "> 0 kg.m2"));
         }
         if turning == Turning::Round && (Iyy - Izz).abs() > 1e-12 * Iyy.abs() {
             let reason = "joint.kind = spherical_rod needs a rod that is round about its axis";
-            return Err(refused("inertia.zz", Izz, reason, format!("inertia.yy = {Iyy} kg.m2")));
+            return Err(ParameterError::refused(
+                "inertia.zz",
+                Izz,
+                reason,
+                format!("inertia.yy = {Iyy} kg.m2"),
+            ));
         }
         let moments = [Ixx, Iyy, Izz];
         let largest = moments.iter().copied().fold(0.0, f64::max);
@@ -88,7 +87,12 @@ impl RodParameters {
         if matches!(turning, Turning::Universal | Turning::Free) && excess > 1e-12 * largest {
             let reason =
                 format!("the largest of {moments:?} exceeds the sum of the others by {excess:.3e} kg.m2");
-            return Err(refused("inertia.xx", Ixx, reason, "moments that satisfy the triangle inequality"));
+            return Err(ParameterError::refused(
+                "inertia.xx",
+                Ixx,
+                reason,
+                "moments that satisfy the triangle inequality",
+            ));
         }
         let I_c = SymmetricTensor::diagonal(Ixx, Iyy, Izz).matrix();
         Ok(Rigid { m, c: Vector3::new(c, 0.0, 0.0), I_c })

@@ -4,7 +4,6 @@ use mechanics::{Dim, Scalar, Space, Vector};
 use model::{EvaluationError, ParameterError};
 
 use super::coordinates::Coordinates;
-use super::double_wishbone::refused;
 use super::variables::Motion;
 use super::wishbone::{CARRIER, LOWER, Loads, UPPER, Wishbone};
 
@@ -51,7 +50,7 @@ where
                 x[rate] = given.lower_theta_dot;
             }
             self.rigid.close_loops(x, |number| self.root(number), LOWER).map_err(|error| {
-                refused(
+                ParameterError::refused(
                     "lower.angle.theta",
                     given.lower_theta,
                     format!("the loop cannot close at {theta:.6} rad: {error}"),

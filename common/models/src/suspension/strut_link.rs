@@ -16,7 +16,6 @@ use model::{
 };
 
 use super::coordinates::{Coordinates, Orientation};
-use super::double_wishbone::refused;
 use super::element::{Element, LoadAt, PosedOf, element_functions, field, restricted, tensor};
 use super::rod::{RodParameters, Turning};
 use super::variables::{Root, Slot};
@@ -272,7 +271,7 @@ impl Model for StrutLink {
     fn new(p: &Parameters, start: &Motion<f64>) -> Result<Self, ParameterError> {
         if p.s1 > p.rod.length {
             let allowed = format!("0 < strut.s1 <= {} m", p.rod.length);
-            return Err(refused("strut.s1", p.s1, "S must lie on the link", allowed));
+            return Err(ParameterError::refused("strut.s1", p.s1, "S must lie on the link", allowed));
         }
         let turning = if p.joint == StrutJoint::Spherical { Turning::Free } else { Turning::OneAxis };
         let rigid = p.rod.checked(turning)?;
