@@ -7,7 +7,7 @@ use std::ops::Range;
 use model::{Causality, Entry, Group, Kind, Model, Variability, Variables, count_states};
 
 use crate::inputs::{PortParameters, PortReset};
-use crate::{SolverCounters, SolverParameters};
+use crate::{SolverCounters, SolverParameters, Standard};
 
 /// Where each group of variables of the model `M` lies in the list, fixed at compile time.
 #[derive(Debug)]
@@ -230,7 +230,7 @@ impl Table {
         for Variable { name, entry, .. } in &self.variables {
             hash.write(name.as_bytes());
             hash.write(entry.unit.as_bytes());
-            hash.write(kind_name(entry.kind).as_bytes());
+            hash.write(Standard::Fmi3.type_name(entry.kind).as_bytes());
             if let Kind::Enumeration(t) = entry.kind {
                 t.items.iter().for_each(|i| hash.write(i.name.as_bytes()));
             }
@@ -275,17 +275,6 @@ impl Fnv {
         for b in bytes.iter().chain(&[0xff]) {
             self.0 = (self.0 ^ u128::from(*b)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b);
         }
-    }
-}
-
-/// Name of a type as FMI 3.0 spells it.
-pub(crate) const fn kind_name(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Float64 => "Float64",
-        Kind::Int32 => "Int32",
-        Kind::Int64 => "Int64",
-        Kind::Boolean => "Boolean",
-        Kind::Enumeration(_) => "Enumeration",
     }
 }
 

@@ -4,8 +4,8 @@ use model::{Causality, Entry, Kind, Model, Variability};
 
 use crate::phase::{Interface, Phase};
 use crate::state::State;
-use crate::table::{ALL_PARTS, FLOAT, Layout, Variable, allowed, changes_in_a_run, kind_name};
-use crate::{Fault, Instance};
+use crate::table::{ALL_PARTS, FLOAT, Layout, Variable, allowed, changes_in_a_run};
+use crate::{Fault, Instance, Standard};
 
 impl<M: Model> Instance<M> {
     /// Read Float64 variables.
@@ -30,9 +30,12 @@ impl<M: Model> Instance<M> {
 
     fn wrong_type(&self, reference: u32, called: &'static str) -> Fault {
         match self.variable(reference) {
-            Ok(v) => {
-                Fault::WrongType { variable: v.name.clone(), reference, is: kind_name(v.entry.kind), called }
-            }
+            Ok(v) => Fault::WrongType {
+                variable: v.name.clone(),
+                reference,
+                is: Standard::Fmi3.type_name(v.entry.kind),
+                called,
+            },
             Err(fault) => fault,
         }
     }
