@@ -14,7 +14,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use model::{Kind, Model};
 
 use crate::phase::{self, Interface, Rule};
-use crate::{Fault, Instance, State, Status};
+use crate::{Fault, Instance, SerialisedStateError, State, Status};
 
 /// `fmi3LogMessageCallback`
 pub type LogMessage = unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char);
@@ -642,12 +642,16 @@ pub unsafe fn fmi3GetFMUState<M: Model>(instance: *mut c_void, state: *mut *mut 
 #[doc(hidden)]
 pub unsafe fn fmi3SetFMUState<M: Model>(instance: *mut c_void, state: *mut c_void) -> Status {
     // SAFETY: a state that is not null came from `fmi3GetFMUState` and was not freed (FMI).
-    unsafe {
-        call::<M>(instance, &phase::SET_FMU_STATE, |c| {
-            let saved = state.cast::<State<M>>().as_ref().ok_or(Fault::Null { argument: "FMUState" })?;
-            c.instance.restore(saved)
-        })
-    }
+    unsafe { call::<M>(instance, &phase::SET_FMU_STATE, |c| c.instance.restore(saved::<M>(state)?)) }
+}
+
+/// A saved state.
+///
+/// # Safety
+/// `state` is null or a state that was given out and not freed.
+unsafe fn saved<'a, M: Model>(state: *mut c_void) -> Result<&'a State<M>, Fault> {
+    // SAFETY: by the contract of this function.
+    unsafe { state.cast::<State<M>>().as_ref() }.ok_or(Fault::Null { argument: "FMUState" })
 }
 
 #[doc(hidden)]
@@ -660,6 +664,59 @@ pub unsafe fn fmi3FreeFMUState<M: Model>(instance: *mut c_void, state: *mut *mut
                 drop(Box::from_raw(slot.cast::<State<M>>()));
                 *slot = std::ptr::null_mut();
             }
+            Ok(())
+        })
+    }
+}
+
+#[doc(hidden)]
+pub unsafe fn fmi3SerializedFMUStateSize<M: Model>(
+    instance: *mut c_void,
+    state: *mut c_void,
+    size: *mut usize,
+) -> Status {
+    // SAFETY: FMI pointers, checked for null; a state that is not null is one of ours (FMI).
+    unsafe {
+        call::<M>(instance, &phase::SERIALISED_SIZE, |c| {
+            let saved = saved::<M>(state)?;
+            array_mut("size", size, 1)?[0] = c.instance.serialise(saved)?.len();
+            Ok(())
+        })
+    }
+}
+
+#[doc(hidden)]
+pub unsafe fn fmi3SerializeFMUState<M: Model>(
+    instance: *mut c_void,
+    state: *mut c_void,
+    data: *mut u8,
+    size: usize,
+) -> Status {
+    // SAFETY: FMI pointers, checked for null; a state that is not null is one of ours (FMI).
+    unsafe {
+        call::<M>(instance, &phase::SERIALISE, |c| {
+            let bytes = c.instance.serialise(saved::<M>(state)?)?;
+            if size != bytes.len() {
+                return Err(SerialisedStateError::length(size, bytes.len()).into());
+            }
+            array_mut("serializedState", data, size)?.copy_from_slice(&bytes);
+            Ok(())
+        })
+    }
+}
+
+#[doc(hidden)]
+pub unsafe fn fmi3DeserializeFMUState<M: Model>(
+    instance: *mut c_void,
+    data: *const u8,
+    size: usize,
+    state: *mut *mut c_void,
+) -> Status {
+    // SAFETY: FMI pointers, checked for null.
+    unsafe {
+        call::<M>(instance, &phase::DESERIALISE, |c| {
+            let slot = &mut array_mut("FMUState", state, 1)?[0];
+            *slot = Box::into_raw(c.instance.deserialise(array("serializedState", data, size)?)?).cast();
             Ok(())
         })
     }
@@ -781,6 +838,9 @@ macro_rules! export {
             fmi3GetFMUState(state: *mut *mut c_void);
             fmi3SetFMUState(state: *mut c_void);
             fmi3FreeFMUState(state: *mut *mut c_void);
+            fmi3SerializedFMUStateSize(state: *mut c_void, size: *mut usize);
+            fmi3SerializeFMUState(state: *mut c_void, data: *mut u8, size: usize);
+            fmi3DeserializeFMUState(data: *const u8, size: usize, state: *mut *mut c_void);
         }
         $crate::no_variables! { $model,
             fmi3GetFloat32 "Float32" true *mut f32; fmi3GetInt8 "Int8" true *mut i8; fmi3GetUInt8 "UInt8" true *mut u8;
@@ -807,10 +867,6 @@ macro_rules! export {
             fmi3SetShiftFraction(vr: *const u32, n: usize, counters: *const u64, resolutions: *const u64);
             fmi3EvaluateDiscreteStates();
             fmi3ActivateModelPartition(clock: u32, time: f64);
-            "serialised state is not declared":
-            fmi3SerializedFMUStateSize(state: *mut c_void, size: *mut usize);
-            fmi3SerializeFMUState(state: *mut c_void, data: *mut u8, size: usize);
-            fmi3DeserializeFMUState(data: *const u8, size: usize, state: *mut *mut c_void);
             "there are no structural parameters":
             fmi3EnterConfigurationMode();
             fmi3ExitConfigurationMode();

@@ -3,7 +3,7 @@
 use integrators::{SettingsError, StepError};
 use model::{EvaluationError, ParameterError};
 
-use crate::{Interface, SolverMethod};
+use crate::{Interface, SerialisedStateError, SolverMethod};
 
 /// Status of a call, numbered as `fmi3Status`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,6 +134,9 @@ pub enum Fault {
         /// How this one is used
         instance: Interface,
     },
+    /// Bytes that are no state of this FMU.
+    #[error("serialised state is refused: {0}")]
+    Serialised(#[from] SerialisedStateError),
     /// Parameters that do not fit together.
     #[error(transparent)]
     Parameter(#[from] ParameterError),

@@ -4,6 +4,7 @@ use integrators::{Solver, Statistics};
 use model::{Model, ParameterError, Variability, Variables};
 use num_dual::Dual64;
 
+use crate::built::Built;
 use crate::inputs::{Channels, Polynomials};
 use crate::jobs::{Evaluate, EventIndicators, Rates, Start};
 use crate::phase::{Interface, Phase, Rule};
@@ -135,13 +136,9 @@ impl<M: Model> Instance<M> {
         if self.state.model.is_some() {
             return Ok(());
         }
-        let values = &self.state.values;
         let given = &self.state.motion_start;
-        let parameters = M::Parameters::load(&values[Layout::<M>::PARAMETERS]);
-        let mut model = M::new(&parameters, &M::Motion::load(given))?;
-        if self.state.interface == Interface::ModelExchange {
-            model.for_model_exchange();
-        }
+        let exchange = self.state.interface == Interface::ModelExchange;
+        let model = Built::<M>::new(&self.state.values[Layout::<M>::PARAMETERS], given, exchange)?;
         let (x, discrete, names) = model.with_system(Start { t: self.state.start_time, given })?;
         if M::MODEL_EXCHANGE {
             let place = |name: String| {
@@ -197,10 +194,7 @@ impl<M: Model> Instance<M> {
         if self.state.retune
             && let Some(model) = &mut self.state.model
         {
-            model.retune(&M::Parameters::load(&self.state.values[Layout::<M>::PARAMETERS]));
-            if self.state.interface == Interface::ModelExchange {
-                model.for_model_exchange();
-            }
+            model.retune(&self.state.values[Layout::<M>::PARAMETERS]);
             self.state.retune = false;
             self.state.guarded = 0.0;
             self.state.fresh = 0;

@@ -8,6 +8,7 @@
 //! An FMU crate is `fmu_export::export!(Model);` in its library and `fmu_export::run::<Model>()` in
 //! its program, which describes and packs it.
 
+mod built;
 pub mod c_abi;
 mod derivatives;
 mod describe;
@@ -19,6 +20,7 @@ mod instance;
 mod jobs;
 mod package;
 mod phase;
+mod serialise;
 mod solver;
 mod standard;
 mod state;
@@ -34,6 +36,7 @@ pub use inputs::{InputTreatment, PortParameters, PortReset};
 pub use instance::Instance;
 pub use package::{PackError, archive, run};
 pub use phase::{Interface, Phase, Rule};
+pub use serialise::SerialisedStateError;
 pub use solver::{SolverCounters, SolverMethod, SolverParameters};
 pub use standard::Standard;
 pub use state::State;

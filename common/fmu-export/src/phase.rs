@@ -2,8 +2,10 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 /// How an instance is used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Interface {
     /// Co-Simulation with eventModeUsed = false
@@ -46,7 +48,7 @@ impl fmt::Display for Interface {
 }
 
 /// Where an instance stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Phase {
     /// Created or reset
@@ -126,6 +128,9 @@ rules! {
     GET_FMU_STATE "fmi3GetFMUState" ALL_INTERFACES ANY;
     SET_FMU_STATE "fmi3SetFMUState" ALL_INTERFACES ANY;
     FREE_FMU_STATE "fmi3FreeFMUState" ALL_INTERFACES ANY;
+    SERIALISED_SIZE "fmi3SerializedFMUStateSize" ALL_INTERFACES ANY;
+    SERIALISE "fmi3SerializeFMUState" ALL_INTERFACES ANY;
+    DESERIALISE "fmi3DeserializeFMUState" ALL_INTERFACES ANY;
     DIRECTIONAL_DERIVATIVE "fmi3GetDirectionalDerivative" ALL_INTERFACES RUNNING;
     DEPENDENCIES "fmi3GetVariableDependencies" ALL_INTERFACES ANY;
     ENTER_CONTINUOUS_TIME_MODE "fmi3EnterContinuousTimeMode" ME EventMode as u8;

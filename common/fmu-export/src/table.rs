@@ -223,8 +223,13 @@ impl Table {
             .collect()
     }
 
-    /// Hash of the variable table, in the form of a GUID: changes when the interface changes.
+    /// [Hash](Self::hash) of the variable table in the form of a GUID.
     pub(crate) fn token(&self, model: &str) -> String {
+        guid(self.hash(model))
+    }
+
+    /// Hash of the variable table: changes when the interface changes.
+    pub(crate) fn hash(&self, model: &str) -> u128 {
         let mut hash = Fnv::new();
         hash.write(model.as_bytes());
         for Variable { name, entry, .. } in &self.variables {
@@ -240,9 +245,14 @@ impl Table {
             }
             entry.depends.iter().for_each(|d| hash.write(d.as_bytes()));
         }
-        let h = format!("{:032x}", hash.0);
-        format!("{{{}-{}-{}-{}-{}}}", &h[..8], &h[8..12], &h[12..16], &h[16..20], &h[20..])
+        hash.0
     }
+}
+
+/// A hash in the form of a GUID.
+pub(crate) fn guid(hash: u128) -> String {
+    let h = format!("{hash:032x}");
+    format!("{{{}-{}-{}-{}-{}}}", &h[..8], &h[8..12], &h[12..16], &h[16..20], &h[20..])
 }
 
 /// The time derivative of a state as a variable.
@@ -265,13 +275,13 @@ const INDICATOR: Entry = {
 };
 
 /// FNV-1a with 128 bits: the same on every platform and toolchain.
-struct Fnv(u128);
+pub(crate) struct Fnv(pub(crate) u128);
 
 impl Fnv {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d)
     }
-    fn write(&mut self, bytes: &[u8]) {
+    pub(crate) fn write(&mut self, bytes: &[u8]) {
         for b in bytes.iter().chain(&[0xff]) {
             self.0 = (self.0 ^ u128::from(*b)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b);
         }

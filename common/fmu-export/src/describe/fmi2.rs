@@ -44,8 +44,12 @@ pub(super) fn document<M: Model>(xml: &mut Xml, table: &Table) -> io::Result<()>
 
 fn interfaces<M: Model>(xml: &mut Xml) -> io::Result<()> {
     let with = |more: &[&'static str]| {
-        let yes =
-            ["canNotUseMemoryManagementFunctions", "canGetAndSetFMUstate", "providesDirectionalDerivative"];
+        let yes = [
+            "canNotUseMemoryManagementFunctions",
+            "canGetAndSetFMUstate",
+            "canSerializeFMUstate",
+            "providesDirectionalDerivative",
+        ];
         let flags = yes.iter().chain(more).map(|flag| (*flag, "true".to_string()));
         [("modelIdentifier", M::NAME.to_string())].into_iter().chain(flags).collect::<Vec<_>>()
     };

@@ -36,7 +36,7 @@ pub(super) fn document<M: Model>(xml: &mut Xml, table: &Table) -> io::Result<()>
 
 fn interfaces<M: Model>(xml: &mut Xml) -> io::Result<()> {
     let with = |more: &[&'static str]| {
-        let yes = ["canGetAndSetFMUState", "providesDirectionalDerivatives"];
+        let yes = ["canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"];
         let flags = yes.iter().chain(more).map(|flag| (*flag, "true".to_string()));
         [("modelIdentifier", M::NAME.to_string())].into_iter().chain(flags).collect::<Vec<_>>()
     };

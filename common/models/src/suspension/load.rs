@@ -8,11 +8,12 @@
 use std::f64::consts::PI;
 
 use mechanics::{Dim, Scalar, Space, Vector};
+use serde::{Deserialize, Serialize};
 
 use super::LoadParameters;
 
 /// Where the time stands relative to the pulse; changed by the time events at both ends.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PulsePhase {
     /// Not yet begun
     #[default]
