@@ -3,6 +3,7 @@
 
 LOCK_STAMP=.venv/.locked
 NEXTEST_VERSION=0.9.143
+FMI_VERSIONS=(2 3)
 
 # a relative CARGO_TARGET_DIR counts from where the script was called, as it does for cargo
 if [[ -n ${CARGO_TARGET_DIR:-} ]]; then

@@ -1,7 +1,7 @@
 //! An instance of an FMU without its C boundary: life cycle and lazy outputs.
 
 use integrators::{Solver, Statistics};
-use model::{Model, ParameterError, Variability, Variables};
+use model::{Kind, Model, ParameterError, Variability, Variables};
 use num_dual::Dual64;
 
 use crate::built::Built;
@@ -107,11 +107,17 @@ impl<M: Model> Instance<M> {
             .ok_or(Fault::UnknownReference { reference, count: self.table.variables.len() })
     }
 
-    /// Begin initialisation.
+    /// Name of a type in the standard that the instance speaks.
+    #[must_use]
+    pub fn type_name(&self, kind: Kind) -> &'static str {
+        self.state.interface.standard().type_name(kind)
+    }
+
+    /// Times of the run.
     ///
     /// # Errors
     /// Times that make no sense.
-    pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
+    pub fn setup_experiment(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
         if !start.is_finite() {
             return Err(Fault::Argument { argument: "startTime", value: start, allowed: "finite".into() });
         }
@@ -126,9 +132,26 @@ impl<M: Model> Instance<M> {
         }
         self.state.start_time = start;
         self.state.stop_time = stop;
-        self.state.values[0] = start;
+        Ok(())
+    }
+
+    /// Begin initialisation at the time that was set up, otherwise at 0.
+    ///
+    /// # Errors
+    /// None.
+    pub fn begin_initialization(&mut self) -> Result<(), Fault> {
+        self.state.values[0] = self.state.start_time;
         self.state.phase = Phase::InitializationMode;
         Ok(())
+    }
+
+    /// Begin initialisation of a run with these times.
+    ///
+    /// # Errors
+    /// As [`setup_experiment`](Self::setup_experiment).
+    pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
+        self.setup_experiment(start, stop)?;
+        self.begin_initialization()
     }
 
     /// Build the model and its consistent start, if values have changed since.
@@ -137,7 +160,7 @@ impl<M: Model> Instance<M> {
             return Ok(());
         }
         let given = &self.state.motion_start;
-        let exchange = self.state.interface == Interface::ModelExchange;
+        let exchange = self.state.interface.is_model_exchange();
         let model = Built::<M>::new(&self.state.values[Layout::<M>::PARAMETERS], given, exchange)?;
         let (x, discrete, names) = model.with_system(Start { t: self.state.start_time, given })?;
         if M::MODEL_EXCHANGE {
@@ -161,7 +184,7 @@ impl<M: Model> Instance<M> {
     /// # Errors
     /// [`Fault::Parameter`], [`Fault::MethodNotOffered`], start states without accelerations.
     pub fn exit_initialization(&mut self) -> Result<(), Fault> {
-        let solver = if self.state.interface == Interface::ModelExchange {
+        let solver = if self.state.interface.is_model_exchange() {
             None
         } else {
             let solver = SolverParameters::load(&self.state.values[Layout::<M>::SOLVER]);

@@ -1,7 +1,7 @@
 //! Exports a [`model::Model`] as an FMU.
 //!
 //! ```text
-//! model (safe trait)  ->  instance (values, phases, lazy outputs, steps)  ->  c_abi (FMI 3.0)
+//! model (safe trait)  ->  instance (values, phases, lazy outputs, steps)  ->  c_abi (FMI 2.0, 3.0)
 //!                     ->  describe (modelDescription.xml)                 ->  package (.fmu)
 //! ```
 //!
