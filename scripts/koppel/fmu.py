@@ -570,6 +570,10 @@ class Equations(Instance):
         """Event Mode -> Continuous-Time Mode; `x` is read."""
         self.update_discrete_states()
         self.check("fmi3EnterContinuousTimeMode")
+        self.read_states()
+
+    def read_states(self):
+        """Get the states into `x`."""
         self.check("fmi3GetContinuousStates", self._x, self.nx)
 
     def set_time(self, t: float):
