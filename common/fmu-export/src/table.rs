@@ -210,6 +210,9 @@ impl Table {
                 if let Some(alone) = d.strip_prefix('=') {
                     return name == alone;
                 }
+                if let Some(group) = d.strip_suffix(".*") {
+                    return name.strip_prefix(group).is_some_and(|rest| rest.starts_with('.'));
+                }
                 if let Some(same) = d.strip_suffix('@') {
                     return name.strip_prefix(same) == Some(component);
                 }
