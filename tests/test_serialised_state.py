@@ -4,7 +4,6 @@ import os
 import random
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,9 +21,8 @@ def in_another_process(fmu, way, data, folder):
     state, result = folder / "state", folder / "result"
     state.write_bytes(data)
     arguments = [fmu.path, way, state, str(BEFORE), str(AFTER), result]
-    subprocess.run(
-        [sys.executable, serialised.__file__, *arguments], check=True, env={**os.environ, "PYTHONPATH": ":".join(sys.path)}
-    )
+    environment = {**os.environ, "PYTHONPATH": ":".join(sys.path)}
+    subprocess.run([sys.executable, serialised.__file__, *arguments], check=True, env=environment)
     return np.frombuffer(result.read_bytes()).reshape(AFTER, -1)
 
 
@@ -62,7 +60,10 @@ def test_every_method_takes_its_memory_along(wishbone, method, tmp_path):
     assert in_another_process(wishbone, "cs", data, tmp_path).tobytes() == expected.tobytes()
 
 
-@pytest.mark.parametrize("values", [scenes.SPATIAL, {"strut.preload_mode": "static", "gravity.z": -9.81}], ids=["spatial", "static"])
+BUILT = {"spatial": scenes.SPATIAL, "static": {"strut.preload_mode": "static", "gravity.z": -9.81}}
+
+
+@pytest.mark.parametrize("values", BUILT.values(), ids=BUILT)
 def test_the_model_is_built_again_as_it_was(wishbone, values, tmp_path):
     data, expected = cut(wishbone, "cs", values)
     assert in_another_process(wishbone, "cs", data, tmp_path).tobytes() == expected.tobytes()

@@ -333,3 +333,14 @@ pub unsafe fn unsupported<M: Model>(
     // SAFETY: the instance as the host passes it.
     unsafe { shared::unsupported::<M>(instance, &phase::UNSUPPORTED, function, reason) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::integer;
+
+    #[test]
+    fn whole_numbers_fit_up_to_the_largest_of_their_type() {
+        assert_eq!([2_147_483_647.0, -3.0].map(integer), [Some(i32::MAX), Some(-3)]);
+        assert_eq!([2_147_483_648.0, f64::NAN].map(integer), [None, None]);
+    }
+}
