@@ -141,6 +141,34 @@ def test_random_damage_is_refused(stepped):
     instance.step(0.1, 0.1)
 
 
+def checksum(data):
+    """FNV-1a with 128 bits of the bytes and a closing 0xff."""
+    value = 0x6C62272E07BB014262B821756295C58D
+    for byte in [*data, 0xFF]:
+        value = (value ^ byte) * 0x0000000001000000000000000000013B % 2**128
+    return value.to_bytes(16, "little")
+
+
+def test_forged_content_never_breaks_the_instance(stepped):
+    """With a right checksum only the content is left to be looked at: lists of other lengths, other parameters."""
+    instance, data = stepped
+    assert checksum(data[:-16]) == data[-16:]
+    chance, refused = random.Random(3), 0
+    for i in range(300):
+        forged = bytearray(data[:-16])
+        # every other time among the first bytes: interface, phase and the length of the values
+        place = 28 + (i // 2 % 8 if i % 2 else chance.randrange(len(forged) - 28))
+        forged[place] = 0xFF if i % 3 == 0 else chance.randrange(256)
+        try:
+            instance.free_state(instance.deserialise(bytes(forged) + checksum(forged), at=0.1))
+        except FmuError as error:
+            assert error.status == Status.ERROR
+            assert "content is not a state of this model" in str(error)
+            refused += 1
+    assert refused > 50
+    instance.step(0.1, 0.1)
+
+
 def test_the_state_of_another_fmu_is_refused(stepped, fmu):
     instance, _ = stepped
     data, _ = cut(fmu("double_pendulum"), "cs", {})
