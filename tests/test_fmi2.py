@@ -1,9 +1,9 @@
 """FMI 2.0 archives: the same model as the FMI 3.0 twin, and the rules of the older standard."""
 
-import functools
 import math
 import random
 import re
+import shutil
 import zipfile
 from ctypes import byref, c_char, c_double, c_int, c_size_t, c_void_p
 
@@ -23,7 +23,16 @@ THETA = "lower.angle.theta"
 @pytest.fixture(scope="module")
 def archive():
     """`archive(name)`: unpacked once."""
-    return functools.cache(Archive)
+    opened = {}
+
+    def load(name):
+        if name not in opened:
+            opened[name] = Archive(name)
+        return opened[name]
+
+    yield load
+    for one in opened.values():
+        shutil.rmtree(one.folder, ignore_errors=True)
 
 
 @pytest.fixture
@@ -100,12 +109,13 @@ def test_capabilities_are_declared(name):
 # the same numbers -----------------------------------------------------------------------------------------------------
 def force(description, stop):
     """Inputs that move: the first three of the kind force or acceleration, as fmpy takes them."""
-    names = [v.name for v in description.modelVariables if v.causality == "input" and re.search(r"\.[Fa](\.|$)", v.name)]
+    inputs = [v.name for v in description.modelVariables if v.causality == "input"]
+    names = [name for name in inputs if re.search(r"\.[Fa](\.|$)", name)][:3]
     t = np.linspace(0.0, stop, 101)
-    columns = [0.5 * np.sin(7.0 * t + i) for i in range(len(names[:3]))]
-    signal = np.zeros(len(t), dtype=[("time", float), *[(name, float) for name in names[:3]]])
+    columns = [0.5 * np.sin(7.0 * t + i) for i in range(len(names))]
+    signal = np.zeros(len(t), dtype=[("time", float), *[(name, float) for name in names]])
     signal["time"] = t
-    for name, column in zip(names[:3], columns):
+    for name, column in zip(names, columns):
         signal[name] = column
     return signal
 
@@ -165,7 +175,7 @@ def test_directional_derivatives_are_those_of_the_twin(wishbone, running):
     assert expected.all()
 
 
-# refusals ---------------------------------------------------------------------------------------------------------------
+# refusals -------------------------------------------------------------------------------------------------------------
 def test_a_refused_value_is_discarded_and_changes_nothing(running):
     before = running.get([*running.archive.names("output"), "P.F.z"])
     for name, value in [("P.F.z", math.nan), ("strut.c", -1.0), ("strut.c", math.inf)]:
@@ -313,8 +323,8 @@ def test_instances_need_the_right_guid_and_kind_but_no_callbacks(archive):
     assert host.dll.fmi2Reset(None) == Status.ERROR
 
 
-def test_inquiries():
-    slave = Host(Archive("link2")).fmu
+def test_inquiries(archive):
+    slave = Host(archive("link2")).fmu
     assert (slave.getVersion(), slave.getTypesPlatform()) == ("2.0", "default")
 
 

@@ -4,7 +4,6 @@ import os
 import random
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,9 +21,8 @@ def in_another_process(fmu, way, data, folder):
     state, result = folder / "state", folder / "result"
     state.write_bytes(data)
     arguments = [fmu.path, way, state, str(BEFORE), str(AFTER), result]
-    subprocess.run(
-        [sys.executable, serialised.__file__, *arguments], check=True, env={**os.environ, "PYTHONPATH": ":".join(sys.path)}
-    )
+    environment = {**os.environ, "PYTHONPATH": ":".join(sys.path)}
+    subprocess.run([sys.executable, serialised.__file__, *arguments], check=True, env=environment)
     return np.frombuffer(result.read_bytes()).reshape(AFTER, -1)
 
 
@@ -62,7 +60,10 @@ def test_every_method_takes_its_memory_along(wishbone, method, tmp_path):
     assert in_another_process(wishbone, "cs", data, tmp_path).tobytes() == expected.tobytes()
 
 
-@pytest.mark.parametrize("values", [scenes.SPATIAL, {"strut.preload_mode": "static", "gravity.z": -9.81}], ids=["spatial", "static"])
+BUILT = {"spatial": scenes.SPATIAL, "static": {"strut.preload_mode": "static", "gravity.z": -9.81}}
+
+
+@pytest.mark.parametrize("values", BUILT.values(), ids=BUILT)
 def test_the_model_is_built_again_as_it_was(wishbone, values, tmp_path):
     data, expected = cut(wishbone, "cs", values)
     assert in_another_process(wishbone, "cs", data, tmp_path).tobytes() == expected.tobytes()
@@ -137,6 +138,34 @@ def test_random_damage_is_refused(stepped):
             del damaged[chance.randrange(len(damaged)) :]
         if bytes(damaged) != data:
             assert "serialised state is refused" in refusal(instance, bytes(damaged))
+    instance.step(0.1, 0.1)
+
+
+def checksum(data):
+    """FNV-1a with 128 bits of the bytes and a closing 0xff."""
+    value = 0x6C62272E07BB014262B821756295C58D
+    for byte in [*data, 0xFF]:
+        value = (value ^ byte) * 0x0000000001000000000000000000013B % 2**128
+    return value.to_bytes(16, "little")
+
+
+def test_forged_content_never_breaks_the_instance(stepped):
+    """With a right checksum only the content is left to be looked at: lists of other lengths, other parameters."""
+    instance, data = stepped
+    assert checksum(data[:-16]) == data[-16:]
+    chance, refused = random.Random(3), 0
+    for i in range(300):
+        forged = bytearray(data[:-16])
+        # every other time among the first bytes: interface, phase and the length of the values
+        place = 28 + (i // 2 % 8 if i % 2 else chance.randrange(len(forged) - 28))
+        forged[place] = 0xFF if i % 3 == 0 else chance.randrange(256)
+        try:
+            instance.free_state(instance.deserialise(bytes(forged) + checksum(forged), at=0.1))
+        except FmuError as error:
+            assert error.status == Status.ERROR
+            assert "content is not a state of this model" in str(error)
+            refused += 1
+    assert refused > 50
     instance.step(0.1, 0.1)
 
 

@@ -7,6 +7,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::table::Layout;
+use crate::values::possible;
 
 /// What a model is built from.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -71,6 +72,10 @@ impl<'de, M: Model> Deserialize<'de> for Built<M> {
         let count = Layout::<M>::PARAMETERS.len();
         if parameters.len() != count || tuned.len() != count || start.len() != Layout::<M>::MOTION.len() {
             return Err(D::Error::custom("number of parameters"));
+        }
+        let fit = |values: &[f64]| possible(M::Parameters::TABLE.iter(), values);
+        if !fit(&parameters) || !fit(&tuned) {
+            return Err(D::Error::custom("parameter out of its range"));
         }
         let mut built = Self::new(&parameters, &start, exchange).map_err(D::Error::custom)?;
         if tuned.iter().zip(&parameters).any(|(a, b)| a.to_bits() != b.to_bits()) {

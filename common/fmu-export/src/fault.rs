@@ -80,7 +80,7 @@ pub enum Fault {
     )]
     NoStatus {
         /// The kind
-        kind: i32,
+        kind: u32,
     },
     /// Null where data is needed.
     #[error("{argument} is null")]

@@ -6,11 +6,14 @@
 //! The token is the hash of the variable table, the checksum the same hash of all bytes before it.
 //! Numbers keep their bits. The model itself is not written but built again from its parameters.
 
+use std::ops::Range;
+
 use model::Model;
 
 use crate::jobs::Size;
 use crate::state::State;
 use crate::table::{Fnv, Layout, Table, guid};
+use crate::values::possible;
 use crate::{Fault, Instance};
 
 /// Changes whenever the content does: another field of the state, another order.
@@ -131,11 +134,14 @@ fn checksum(bytes: &[u8]) -> u128 {
 }
 
 impl<M: Model> State<M> {
-    /// True if all lists have the lengths that belong to the model.
+    /// True if all lists have the lengths that belong to the model, and parameters are in their ranges.
     fn fits(&self, table: &Table) -> bool {
         let inputs = Layout::<M>::INPUTS.len();
         let states = self.model.as_ref().map(|model| model.with_system(Size));
+        let parameters = Layout::<M>::PARAMETERS.start..Layout::<M>::PORT.end; // the solver's and the port's, too
+        let entries = |range: Range<usize>| table.variables[range].iter().map(|v| &v.entry);
         self.values.len() == table.variables.len()
+            && possible(entries(parameters.clone()), &self.values[parameters])
             && self.motion_start.len() == Layout::<M>::MOTION.len()
             && states.is_none_or(|n| self.x.len() == n)
             && self.places.len() == if M::MODEL_EXCHANGE { self.x.len() } else { 0 }

@@ -159,6 +159,11 @@ pub(crate) fn same_length(references: usize, values: usize) -> Result<(), Fault>
     if references == values { Ok(()) } else { Err(Fault::Length { references, values }) }
 }
 
+/// True if these may be values of these variables: start values, or what may be set.
+pub(crate) fn possible<'a>(entries: impl Iterator<Item = &'a Entry>, values: &[f64]) -> bool {
+    entries.zip(values).all(|(entry, v)| in_range(entry, *v) || v.to_bits() == entry.start.to_bits())
+}
+
 /// True if `value` may be set.
 #[allow(clippy::float_cmp, reason = "items are whole numbers")]
 fn in_range(entry: &Entry, value: f64) -> bool {

@@ -54,11 +54,11 @@ macro_rules! export_fmi2 {
             fmi2GetContinuousStates(states: *mut f64, n: usize);
             fmi2GetNominalsOfContinuousStates(nominals: *mut f64, n: usize);
             // Co-Simulation
-            fmi2GetStatus(kind: i32, value: *mut Status);
-            fmi2GetRealStatus(kind: i32, value: *mut f64);
-            fmi2GetIntegerStatus(kind: i32, value: *mut i32);
-            fmi2GetBooleanStatus(kind: i32, value: *mut i32);
-            fmi2GetStringStatus(kind: i32, value: *mut *const c_char);
+            fmi2GetStatus(kind: u32, value: *mut Status);
+            fmi2GetRealStatus(kind: u32, value: *mut f64);
+            fmi2GetIntegerStatus(kind: u32, value: *mut i32);
+            fmi2GetBooleanStatus(kind: u32, value: *mut i32);
+            fmi2GetStringStatus(kind: u32, value: *mut *const c_char);
         }
         $crate::unsupported! { $model, fmi2_unsupported fmi2,
             "inputs go on as port.inputs says":
@@ -85,7 +85,7 @@ macro_rules! export_fmi2 {
             }
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi2Instantiate(
-                name: *const c_char, interface: i32, guid: *const c_char, resources: *const c_char,
+                name: *const c_char, interface: u32, guid: *const c_char, resources: *const c_char,
                 functions: *const fmi2::CallbackFunctions, visible: i32, logging_on: i32,
             ) -> *mut c_void {
                 // SAFETY: the arguments as the host passes them.
@@ -152,7 +152,7 @@ macro_rules! export_fmi3 {
             fmi3SetBoolean(vr: *const u32, n: usize, values: *const u8, n_values: usize);
             // structure and derivatives
             fmi3GetNumberOfVariableDependencies(vr: u32, n: *mut usize);
-            fmi3GetVariableDependencies(dependent: u32, i_dependent: *mut usize, independents: *mut u32, i_independents: *mut usize, kinds: *mut i32, n: usize);
+            fmi3GetVariableDependencies(dependent: u32, i_dependent: *mut usize, independents: *mut u32, i_independents: *mut usize, kinds: *mut u32, n: usize);
             fmi3GetDirectionalDerivative(unknowns: *const u32, n_unknowns: usize, knowns: *const u32, n_knowns: usize, seed: *const f64, n_seed: usize, sensitivity: *mut f64, n_sensitivity: usize);
             // state
             fmi3GetFMUState(state: *mut *mut c_void);
@@ -177,8 +177,8 @@ macro_rules! export_fmi3 {
             "there are no clocks":
             fmi3GetClock(vr: *const u32, n: usize, values: *mut u8);
             fmi3SetClock(vr: *const u32, n: usize, values: *const u8);
-            fmi3GetIntervalDecimal(vr: *const u32, n: usize, intervals: *mut f64, qualifiers: *mut i32);
-            fmi3GetIntervalFraction(vr: *const u32, n: usize, counters: *mut u64, resolutions: *mut u64, qualifiers: *mut i32);
+            fmi3GetIntervalDecimal(vr: *const u32, n: usize, intervals: *mut f64, qualifiers: *mut u32);
+            fmi3GetIntervalFraction(vr: *const u32, n: usize, counters: *mut u64, resolutions: *mut u64, qualifiers: *mut u32);
             fmi3GetShiftDecimal(vr: *const u32, n: usize, shifts: *mut f64);
             fmi3GetShiftFraction(vr: *const u32, n: usize, counters: *mut u64, resolutions: *mut u64);
             fmi3SetIntervalDecimal(vr: *const u32, n: usize, intervals: *const f64);

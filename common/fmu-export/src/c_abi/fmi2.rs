@@ -63,7 +63,7 @@ pub fn fmi2GetVersion() -> *const c_char {
 #[must_use]
 pub unsafe fn fmi2Instantiate<M: Model>(
     name: *const c_char,
-    interface: i32,
+    interface: u32,
     guid: *const c_char,
     functions: *const CallbackFunctions,
 ) -> *mut c_void {
@@ -280,16 +280,16 @@ pub unsafe fn fmi2DoStep<M: Model>(instance: *mut c_void, t: f64, step: f64) -> 
 }
 
 /// `fmi2LastSuccessfulTime` of `fmi2StatusKind`
-const LAST_SUCCESSFUL_TIME: i32 = 2;
+const LAST_SUCCESSFUL_TIME: u32 = 2;
 /// `fmi2Terminated` of `fmi2StatusKind`
-const TERMINATED: i32 = 3;
+const TERMINATED: u32 = 3;
 
 /// Functions that say something about the last step: one kind has an answer, the others none.
 macro_rules! status {
     ($($name:ident $rule:ident $type:ty, $kind:pat => $answer:expr;)*) => {
         $(
             #[doc(hidden)]
-            pub unsafe fn $name<M: Model>(instance: *mut c_void, kind: i32, value: *mut $type) -> Status {
+            pub unsafe fn $name<M: Model>(instance: *mut c_void, kind: u32, value: *mut $type) -> Status {
                 // SAFETY: FMI pointers, checked for null.
                 unsafe {
                     call::<M>(instance, &phase::$rule, |c| match kind {
@@ -311,7 +311,7 @@ macro_rules! no_status {
     ($($name:ident $rule:ident $type:ty;)*) => {
         $(
             #[doc(hidden)]
-            pub unsafe fn $name<M: Model>(instance: *mut c_void, kind: i32, _value: *mut $type) -> Status {
+            pub unsafe fn $name<M: Model>(instance: *mut c_void, kind: u32, _value: *mut $type) -> Status {
                 // SAFETY: FMI instance, checked for null by `call`.
                 unsafe { call::<M>(instance, &phase::$rule, |_| Err(Fault::NoStatus { kind })) }
             }
@@ -332,4 +332,15 @@ pub unsafe fn unsupported<M: Model>(
 ) -> Status {
     // SAFETY: the instance as the host passes it.
     unsafe { shared::unsupported::<M>(instance, &phase::UNSUPPORTED, function, reason) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::integer;
+
+    #[test]
+    fn whole_numbers_fit_up_to_the_largest_of_their_type() {
+        assert_eq!([2_147_483_647.0, -3.0].map(integer), [Some(i32::MAX), Some(-3)]);
+        assert_eq!([2_147_483_648.0, f64::NAN].map(integer), [None, None]);
+    }
 }

@@ -307,11 +307,11 @@ pub unsafe fn fmi3GetVariableDependencies<M: Model>(
     elements_of_dependent: *mut usize,
     independents: *mut u32,
     elements_of_independents: *mut usize,
-    kinds: *mut i32,
+    kinds: *mut u32,
     n: usize,
 ) -> Status {
     /// `fmi3Dependent`
-    const DEPENDENT: i32 = 4;
+    const DEPENDENT: u32 = 4;
     // SAFETY: FMI pointers, checked for null.
     unsafe {
         call::<M>(instance, &phase::DEPENDENCIES, |c| {
