@@ -174,6 +174,7 @@ impl<M: Model> Instance<M> {
         self.assemble()?;
         self.refresh(ALL_PARTS).map_err(|fault| match fault {
             Fault::Evaluation { source, .. } => ParameterError::Start(source).into(),
+            Fault::NotFinite { variable, value, .. } => Fault::NotFiniteAtStart { variable, value },
             other => other,
         })?;
         if let Some(model) = &self.state.model {

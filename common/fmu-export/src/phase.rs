@@ -113,11 +113,11 @@ rules! {
     DO_STEP "fmi3DoStep" CS StepMode as u8;
     TERMINATE "fmi3Terminate" ALL_INTERFACES TERMINABLE;
     RESET "fmi3Reset" ALL_INTERFACES ANY;
-    GET_FLOAT64 "fmi3GetFloat64" ALL_INTERFACES RUNNING;
-    GET_INT32 "fmi3GetInt32" ALL_INTERFACES RUNNING;
-    GET_INT64 "fmi3GetInt64" ALL_INTERFACES RUNNING;
-    GET_BOOLEAN "fmi3GetBoolean" ALL_INTERFACES RUNNING;
-    GET_OTHER "fmi3Get{VariableType}" ALL_INTERFACES RUNNING;
+    GET_FLOAT64 "fmi3GetFloat64" ALL_INTERFACES ANY;
+    GET_INT32 "fmi3GetInt32" ALL_INTERFACES ANY;
+    GET_INT64 "fmi3GetInt64" ALL_INTERFACES ANY;
+    GET_BOOLEAN "fmi3GetBoolean" ALL_INTERFACES ANY;
+    GET_OTHER "fmi3Get{VariableType}" ALL_INTERFACES ANY;
     SET_FLOAT64 "fmi3SetFloat64" ALL_INTERFACES SETTABLE;
     SET_INT32 "fmi3SetInt32" ALL_INTERFACES SETTABLE;
     SET_INT64 "fmi3SetInt64" ALL_INTERFACES SETTABLE;
@@ -129,7 +129,7 @@ rules! {
     DIRECTIONAL_DERIVATIVE "fmi3GetDirectionalDerivative" ALL_INTERFACES RUNNING;
     DEPENDENCIES "fmi3GetVariableDependencies" ALL_INTERFACES ANY;
     ENTER_CONTINUOUS_TIME_MODE "fmi3EnterContinuousTimeMode" ME EventMode as u8;
-    SET_TIME "fmi3SetTime" ME EventMode as u8 | ContinuousTimeMode as u8;
+    SET_TIME "fmi3SetTime" ME ContinuousTimeMode as u8;
     SET_CONTINUOUS_STATES "fmi3SetContinuousStates" ME ContinuousTimeMode as u8;
     COMPLETED_INTEGRATOR_STEP "fmi3CompletedIntegratorStep" ME ContinuousTimeMode as u8;
     GET_CONTINUOUS_STATES "fmi3GetContinuousStates" ME RUNNING;
