@@ -212,7 +212,8 @@ impl<M: Model> Instance<M> {
     /// Compute the parts of the list that `needed` names and that are out of date.
     #[inline]
     pub(crate) fn refresh(&mut self, needed: u8) -> Result<(), Fault> {
-        if needed & !self.state.fresh == 0 && self.state.model.is_some() && !self.state.retune {
+        let known = needed & !self.state.fresh == 0 && self.state.model.is_some() && !self.state.retune;
+        if needed == 0 || known {
             return Ok(());
         }
         self.compute(needed)

@@ -312,7 +312,9 @@ impl Generator<'_> {
 
     fn get(&mut self) -> Action {
         let access = self.access();
-        Action::Get { access, references: self.references(access, |_| true), spoil: self.spoil() }
+        let references = self.references(access, |_| true);
+        let spoil = if references.is_empty() { Spoil::NullReferences } else { self.spoil() };
+        Action::Get { access, references, spoil }
     }
 
     /// Set variables that may be set there, with an odd value in `odd` of 100 cases.
@@ -322,8 +324,9 @@ impl Generator<'_> {
         let references = self.references(access, |v| {
             everything || standard::may_set(v, place.interface, place.phase) != standard::Verdict::Forbidden
         });
+        let spoil = if references.is_empty() { Spoil::NullValues } else { self.spoil() };
         let values = references.into_iter().map(|reference| (reference, self.value(reference, access, odd)));
-        Action::Set { access, values: values.collect(), spoil: self.spoil() }
+        Action::Set { access, values: values.collect(), spoil }
     }
 
     fn value(&mut self, reference: u32, access: Access, odd: usize) -> u64 {
