@@ -162,7 +162,9 @@ pub enum Fault {
         t: f64,
     },
     /// Parameters, inputs or start values from which a result at the start is not a number.
-    #[error("{variable} would be {value} at the start: parameters, inputs and start values do not fit together")]
+    #[error(
+        "{variable} would be {value} at the start: parameters, inputs and start values do not fit together"
+    )]
     NotFiniteAtStart {
         /// Variable
         variable: String,

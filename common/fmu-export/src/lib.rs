@@ -23,6 +23,7 @@ mod solver;
 mod state;
 mod step;
 mod table;
+mod terminals;
 mod unit;
 mod values;
 

@@ -10,6 +10,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use crate::describe::model_description;
+use crate::terminals::terminals;
 
 /// Everything that can go wrong while packing.
 #[derive(Debug, thiserror::Error)]
@@ -45,13 +46,15 @@ const PLATFORM: &str = match (cfg!(target_os = "windows"), cfg!(target_os = "mac
 /// # Errors
 /// [`PackError`].
 pub fn archive<M: Model>(library: &[u8], extension: &str) -> Result<Vec<u8>, PackError> {
-    let mut files = [
+    let mut files = vec![
         (format!("binaries/{PLATFORM}/{}.{extension}", M::NAME), library.to_vec()),
         ("documentation/licenses/license.spdx".into(), b"MIT OR Apache-2.0\n".to_vec()),
         ("documentation/licenses/LICENSE-APACHE".into(), include_bytes!("../../../LICENSE-APACHE").to_vec()),
         ("documentation/licenses/LICENSE-MIT".into(), include_bytes!("../../../LICENSE-MIT").to_vec()),
         ("modelDescription.xml".into(), model_description::<M>()?),
     ];
+    let terminals = terminals::<M>()?;
+    files.extend(terminals.map(|xml| ("terminalsAndIcons/terminalsAndIcons.xml".into(), xml)));
     files.sort(); // the same order wherever it is built
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)

@@ -225,6 +225,7 @@ impl Api {
     }
 
     /// Free an instance, or call the function with null.
+    #[allow(clippy::needless_pass_by_value, reason = "nobody may use it afterwards")]
     pub(crate) fn free(&self, handle: Option<Handle>) {
         // SAFETY: the instance is live and not used after this; the log is dropped later.
         unsafe { (self.f.free_instance)(of(handle.as_ref())) }

@@ -35,6 +35,7 @@ pub(crate) enum Initial {
 
 /// A variable; its value reference is its place in the list.
 #[derive(Debug, Clone)]
+#[allow(clippy::struct_excessive_bools, reason = "attributes of the description")]
 pub(crate) struct Variable {
     pub(crate) name: String,
     pub(crate) kind: Kind,

@@ -281,7 +281,7 @@ impl Generator<'_> {
         match self.random.below(30) {
             0 => n,
             1 => u32::MAX,
-            2 => self.random.bits() as u32,
+            2 => u32::MAX - u32::try_from(self.random.below(1 << 31)).unwrap_or(0),
             _ => u32::try_from(self.random.below(n as usize)).unwrap_or(0),
         }
     }
@@ -399,7 +399,7 @@ impl Generator<'_> {
             8..16 => Action::Restore(store),
             16 => Action::FreeState(store),
             _ => {
-                let place = self.random.bits() as usize;
+                let place = self.random.below(1 << 20);
                 let mutation = self.random.pick(&[
                     Mutation::None,
                     Mutation::None,

@@ -1,5 +1,7 @@
 //! Carries out calls and judges every single answer.
 
+#![allow(clippy::unnecessary_wraps, reason = "one type of answer for all calls")]
+
 use std::ffi::CString;
 
 use fmi_capi::{DISCARD, ERROR, OK, Status, WARNING, status_name};

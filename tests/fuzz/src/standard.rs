@@ -66,6 +66,7 @@ pub(crate) enum Function {
 
 /// States by their letters: Instantiated, iNitialization, Event, Step, Continuous-time, Terminated. Model Exchange,
 /// Co-Simulation with Event Mode, Co-Simulation without; then the states left open (in Model Exchange).
+#[allow(clippy::match_same_arms, reason = "one row per function")]
 fn row(function: Function) -> [&'static str; 4] {
     match function {
         Function::SetDebugLogging | Function::Reset | Function::FmuState | Function::Dependencies => {
@@ -112,6 +113,7 @@ pub(crate) fn may(function: Function, interface: Interface, phase: Phase) -> Ver
 }
 
 /// May `variable` be set, in a state in which Set may be called?
+#[allow(clippy::match_same_arms, reason = "one row per state")]
 pub(crate) fn may_set(variable: &Variable, interface: Interface, phase: Phase) -> Verdict {
     let input = variable.causality == Causality::Input;
     let continuous_input = input && variable.continuous;

@@ -1,5 +1,7 @@
 //! Judging Get, Set and the lists of Model Exchange.
 
+#![allow(clippy::unnecessary_wraps, reason = "one type of answer for all calls")]
+
 use fmi_capi::{DISCARD, ERROR, OK};
 
 use crate::api::{Array, Lists};
@@ -23,7 +25,12 @@ impl Access {
     }
 
     /// A value as it goes through the interface, as a number.
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "as C does it")]
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "as C does it"
+    )]
     pub(crate) fn number(self, bits: u64) -> f64 {
         let whole = bits.cast_signed();
         match self {
