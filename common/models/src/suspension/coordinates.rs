@@ -4,7 +4,7 @@
 use mechanics::{Joint, Planar, Rigid, Scalar, Spatial};
 use model::{ParameterError, Vector3};
 
-use super::double_wishbone::refused;
+use super::checks::refused;
 use super::variables::{CarrierOrientation, LinkAngles};
 
 /// Start values may be off their manifold by this much.

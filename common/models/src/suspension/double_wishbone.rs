@@ -9,6 +9,7 @@ use model::{
     System, Vector3, Visitor,
 };
 
+use super::checks::{check_inertia, magnitude, positive_inertia, refused};
 use super::coordinates::{Coordinates, Orientation};
 use super::load::{LoadLaw, PulsePhase};
 use super::parameters::{
@@ -123,15 +124,6 @@ impl Model for DoubleWishbone {
     }
 }
 
-pub(super) fn refused(
-    variable: &'static str,
-    value: f64,
-    reason: impl Into<String>,
-    allowed: impl Into<String>,
-) -> ParameterError {
-    ParameterError::Refused { variable, value, reason: reason.into(), allowed: allowed.into() }
-}
-
 /// Conditions between parameters.
 fn check(p: &Parameters) -> Result<(), ParameterError> {
     let between = |name: [&'static str; 2], a: &Vector3<f64>, b: &Vector3<f64>| {
@@ -175,30 +167,6 @@ fn check(p: &Parameters) -> Result<(), ParameterError> {
         return positive_inertia("carrier.inertia", p.carrier_inertia.yy);
     }
     check_inertia("carrier.inertia", &p.carrier_inertia)
-}
-
-/// A tensor that a rigid body can have.
-pub(super) fn check_inertia(
-    name: &'static str,
-    inertia: &SymmetricTensor<f64>,
-) -> Result<(), ParameterError> {
-    let moments = inertia.matrix().symmetric_eigenvalues();
-    positive_inertia(name, moments.min())?;
-    let largest = moments.max();
-    let excess = 2.0 * largest - moments.sum();
-    if excess > 1e-12 * largest {
-        let reason =
-            format!("the largest principal moment exceeds the sum of the others by {excess:.3e} kg.m2");
-        return Err(refused(name, largest, reason, "principal moments that satisfy the triangle inequality"));
-    }
-    Ok(())
-}
-
-pub(super) fn positive_inertia(name: &'static str, smallest: f64) -> Result<(), ParameterError> {
-    if smallest > 0.0 {
-        return Ok(());
-    }
-    Err(refused(name, smallest, "the smallest principal moment is not positive", "positive definite"))
 }
 
 /// Azimuth and elevation of a link vector; in the plane the azimuth is zero.
@@ -500,10 +468,4 @@ where
     fn update(&self, t: f64, _x: &mut [f64; X], _u: &Inputs<f64>, _d: &PulsePhase) -> PulsePhase {
         self.phase(t)
     }
-}
-
-/// Length of a vector, smooth enough at zero for dual numbers.
-pub(super) fn magnitude<S: Scalar, const D: usize>(v: &Vector<S, D>) -> S {
-    let squared = v.dot(v);
-    if squared.re().vanishes() { S::lift(0.0) } else { squared.sqrt() }
 }

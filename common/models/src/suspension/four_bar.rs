@@ -16,7 +16,7 @@ use model::{
     Visitor,
 };
 
-use super::double_wishbone::{magnitude, refused};
+use super::checks::{magnitude, refused};
 use super::element::field;
 use super::linkage::{Energy, Held, Linkage, PlanarRod, check_plane, length, plane, world};
 use super::parameters::StabilisationKind;

@@ -14,8 +14,8 @@ use model::{
     System, Variables, Vector3, Visitor,
 };
 
+use super::checks::{check_inertia, positive_inertia};
 use super::coordinates::{Coordinates, Orientation};
-use super::double_wishbone::{check_inertia, positive_inertia};
 use super::element::{Element, LoadAt, PosedOf, element_functions, field, tensor};
 use super::load::{LoadLaw, PulsePhase};
 use super::parameters::{ForceKind, LoadParameters};

@@ -9,7 +9,7 @@ use mechanics::{
 };
 use model::{EvaluationError, ParameterError, Variables, Vector3};
 
-use super::double_wishbone::refused;
+use super::checks::refused;
 use super::parameters::StabilisationKind;
 use super::variables::Slot;
 use super::wishbone::slots;

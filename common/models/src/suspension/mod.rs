@@ -9,6 +9,7 @@
 //! of [`mechanics::joint`] and [`mechanics::element`], (15)-(16) of [`mechanics::spring`], (17) of
 //! [`mechanics::chain`], (18) of [`mechanics::closure`].
 
+mod checks;
 mod coordinates;
 pub mod double_pendulum;
 mod double_wishbone;

@@ -3,7 +3,7 @@
 use mechanics::Rigid;
 use model::{ParameterError, SymmetricTensor, Variables, Vector3};
 
-use super::double_wishbone::refused;
+use super::checks::refused;
 
 /// Mass and shape of a rod.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]

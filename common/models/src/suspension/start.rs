@@ -3,8 +3,8 @@
 use mechanics::{Dim, Scalar, Space, Vector};
 use model::{EvaluationError, ParameterError};
 
+use super::checks::refused;
 use super::coordinates::Coordinates;
-use super::double_wishbone::refused;
 use super::variables::Motion;
 use super::wishbone::{CARRIER, LOWER, Loads, UPPER, Wishbone};
 

@@ -15,8 +15,8 @@ use model::{
     System, Variables, Vector3, Visitor,
 };
 
+use super::checks::refused;
 use super::coordinates::{Coordinates, Orientation};
-use super::double_wishbone::refused;
 use super::element::{Element, LoadAt, PosedOf, element_functions, field, restricted, tensor};
 use super::rod::{RodParameters, Turning};
 use super::variables::{Root, Slot};
