@@ -115,7 +115,7 @@ def test_members_of_leader_and_follower_meet_in_the_inertial_connection(fmu, nam
         of, kind = members(terminal), PORTS[name][port]
         follows = kind != "leader"
         wanted = [m for m in MEMBERS if kind != "force" or not m.startswith("a.")]
-        assert [m for m in of if not m.startswith("force.")].sort() == wanted.sort()
+        assert sorted(m for m in of if not m.startswith("force.")) == sorted(wanted)
         assert set(of) - set(wanted) == ({f"force.{axis}" for axis in VECTOR} if follows else set())
         for member, variable in of.items():
             quantity, component = member.split(".")
