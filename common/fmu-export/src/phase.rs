@@ -222,7 +222,7 @@ pub(crate) mod fmi2 {
         GET_DERIVATIVES "fmi2GetDerivatives" ME RUNNING;
         GET_INDICATORS "fmi2GetEventIndicators" ME RUNNING;
         GET_CONTINUOUS_STATES "fmi2GetContinuousStates" ME RUNNING;
-        GET_NOMINALS "fmi2GetNominalsOfContinuousStates" ME RUNNING;
+        GET_NOMINALS "fmi2GetNominalsOfContinuousStates" ME ANY;
         GET_STATUS "fmi2GetStatus" CS RUNNING;
         GET_REAL_STATUS "fmi2GetRealStatus" CS RUNNING;
         GET_INTEGER_STATUS "fmi2GetIntegerStatus" CS RUNNING;
@@ -233,6 +233,12 @@ pub(crate) mod fmi2 {
 }
 
 impl Rule {
+    /// The same rule for the function of this name.
+    #[must_use]
+    pub const fn named(&self, function: &'static str) -> Self {
+        Self { function, ..*self }
+    }
+
     /// True if the function may be called in `phase`.
     #[inline]
     #[must_use]
