@@ -217,3 +217,27 @@ fn only_continuous_inputs_change_between_events() {
         fmu.set(name, 1.0).expect("in Event Mode");
     }
 }
+
+/// FMI 3.0.2, 3.2.1: states may be set one by one in Continuous-Time Mode, and only there; guesses before initialisation.
+#[test]
+fn a_single_state_is_set_like_all_of_them() {
+    let name = "lower.angle_rate.theta";
+    let mut one = started(ModelExchange, &[]);
+    let mut all = started(ModelExchange, &[]);
+    let mut x = vec![0.0; all.instance.state_count()];
+    all.instance.get_continuous_states(&mut x).expect("states");
+    let i = all.table().states().iter().position(|s| all.table().variables()[*s].name == name);
+    x[i.expect("a state")] = 0.25;
+    all.instance.set_continuous_states(&x).expect("states");
+    one.set(name, 0.25).expect("a state in Continuous-Time Mode");
+    let (one_by_one, together) = (one.everything().expect("values"), all.everything().expect("values"));
+    assert_eq!(one_by_one, together);
+    one.instance.enter_event_mode().expect("Event Mode");
+    assert_eq!(one.set(name, 0.5).expect_err("refused").status(), Status::Error);
+
+    let mut starting = Named::<DoubleWishbone>::with_interface(ModelExchange);
+    starting.set(name, 0.1).expect("a guess");
+    starting.instance.enter_initialization(0.0, None).expect("Initialization Mode");
+    let fault = starting.set(name, 0.2).expect_err("refused");
+    assert!(fault.status() == Status::Error && fault.to_string().contains("initial = approx"), "{fault}");
+}
