@@ -26,6 +26,7 @@ mod generate;
 mod machine;
 mod options;
 mod random;
+mod saved;
 mod standard;
 mod values;
 mod watchdog;
