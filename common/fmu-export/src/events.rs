@@ -46,17 +46,17 @@ impl<M: Model> Instance<M> {
     /// discontinuity of the inputs.
     ///
     /// # Errors
-    /// Parameters that cannot be taken over.
+    /// Parameters that cannot be taken over; states that would not be finite or stay off their manifold, then nothing
+    /// changes.
     pub fn update_discrete_states(&mut self) -> Result<Event, Fault> {
         self.tuned()?;
         let State { values, model, x, discrete, crossed, fresh, solver, .. } = &mut self.state;
         let (t, u) = (values[0], &values[Layout::<M>::INPUTS]);
         let Updated { changed, states, again, next } = match model {
-            Some(model) => {
-                model.with_system(Update { t, crossed: std::mem::take(crossed), u, x, d: discrete })
-            }
+            Some(model) => model.with_system(Update { t, crossed: *crossed, u, x, d: discrete })?,
             None => Updated { changed: false, states: false, again: false, next: None },
         };
+        *crossed = false;
         if changed {
             *fresh = 0;
             if let Some(solver) = solver {

@@ -186,6 +186,16 @@ pub enum Fault {
         /// Time
         t: f64,
     },
+    /// An orientation that cannot be normalised: its length overflows or is zero.
+    #[error(
+        "an orientation (quaternion or unit vector) is off its manifold by {off:.3e} at t = {t:.6} s and cannot be normalised; allowed: a finite length > 0"
+    )]
+    OffManifold {
+        /// Time
+        t: f64,
+        /// What remains
+        off: f64,
+    },
     /// Parameters, inputs or start values from which a result at the start is not a number.
     #[error(
         "{variable} would be {value} at the start: parameters, inputs and start values do not fit together"
@@ -253,6 +263,7 @@ impl Fault {
             | Self::Step { .. }
             | Self::Unstable { .. }
             | Self::Evaluation { .. }
+            | Self::OffManifold { .. }
             | Self::NotFinite { .. } => Status::Discard,
             Self::Panic { .. } => Status::Fatal,
             _ => Status::Error,

@@ -177,12 +177,17 @@ pub(crate) struct Updated {
 }
 
 impl<M: Model> Visitor<M> for Update<'_, M> {
-    type Output = Updated;
-    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) -> Updated {
+    /// Nothing changes where a state would not be finite or stay off its manifold
+    type Output = Result<Updated, Fault>;
+    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) -> Self::Output {
         let before: [f64; N] = std::array::from_fn(|i| self.x[i]);
         let mut x = before;
         if system.off_manifold(&x) > OFF_MANIFOLD {
             system.normalise(&mut x);
+            let off = system.off_manifold(&x);
+            if off > OFF_MANIFOLD {
+                return Err(Fault::OffManifold { t: self.t, off });
+            }
         }
         let mut d = *self.d;
         let event = system.next_event(&d).filter(|event| due(*event, self.t));
@@ -190,13 +195,22 @@ impl<M: Model> Visitor<M> for Update<'_, M> {
             let t = event.map_or(self.t, |event| event.max(self.t));
             d = system.update(t, &mut x, &M::Inputs::<f64>::load(self.u), &d);
         }
+        if let Some(i) = not_finite(&x) {
+            let variable = system.state_names()[i].clone();
+            return Err(Fault::NotFinite { variable, value: x[i], t: self.t });
+        }
         let states = x.map(f64::to_bits) != before.map(f64::to_bits);
         let changed = states || d != *self.d;
         self.x.copy_from_slice(&x);
         *self.d = d;
         let next = system.next_event(&d);
-        Updated { changed, states, again: next.is_some_and(|event| due(event, self.t)), next }
+        Ok(Updated { changed, states, again: next.is_some_and(|event| due(event, self.t)), next })
     }
+}
+
+/// The first state that is not finite.
+fn not_finite<const N: usize>(x: &[f64; N]) -> Option<usize> {
+    x.iter().position(|x| !x.is_finite())
 }
 
 /// True if the time of an event has come.
@@ -380,6 +394,9 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
                     solver.reset();
                 }
             }
+        }
+        if let Some(index) = not_finite(&x) {
+            return Err(fault(StepError::NotFinite { t, index, value: x[index] })); // by an event at the end
         }
         self.x.copy_from_slice(&x);
         *self.d = driven.d;

@@ -241,3 +241,23 @@ fn a_single_state_is_set_like_all_of_them() {
     let fault = starting.set(name, 0.2).expect_err("refused");
     assert!(fault.status() == Status::Error && fault.to_string().contains("initial = approx"), "{fault}");
 }
+
+/// A quaternion whose length overflows cannot be normalised: the event is discarded and the states stay.
+#[test]
+fn an_event_that_would_break_the_states_is_discarded() {
+    let mut fmu = started(ModelExchange, &[("scene.motion", 2.0), ("carrier.joint", 1.0)]);
+    let mut x = vec![0.0; fmu.instance.state_count()];
+    fmu.instance.get_continuous_states(&mut x).expect("states");
+    let before = x.clone();
+    x.fill(1e200);
+    fmu.instance.set_continuous_states(&x).expect("finite");
+    fmu.instance.enter_event_mode().expect("Event Mode");
+    let mut set = vec![0.0; x.len()];
+    fmu.instance.get_continuous_states(&mut set).expect("states");
+    assert_ne!(set, before);
+    let fault = fmu.instance.update_discrete_states().expect_err("discarded");
+    assert!(fault.status() == Status::Discard && fault.to_string().contains("orientation"), "{fault}");
+    let mut after = vec![0.0; x.len()];
+    fmu.instance.get_continuous_states(&mut after).expect("states");
+    assert_eq!(after, set);
+}
