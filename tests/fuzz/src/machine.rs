@@ -467,7 +467,7 @@ impl<'a> Machine<'a> {
         for (x, rate) in x.iter_mut().zip(&rates) {
             *x += h * rate;
         }
-        if x.iter().any(|x| !x.is_finite()) {
+        if !t.is_finite() || x.iter().any(|x| !x.is_finite()) {
             return Ok((Record::default(), expected));
         }
         let status = self.fmu.api.set_time(self.handle(slot), t);
