@@ -5,7 +5,7 @@ use model::{Model, ParameterError, Variability, Variables};
 use num_dual::Dual64;
 
 use crate::inputs::{Channels, Polynomials};
-use crate::jobs::{Evaluate, EventIndicators, Rates, Start};
+use crate::jobs::{Begin, Evaluate, EventIndicators, Rates, Start};
 use crate::phase::{Interface, Phase, Rule};
 use crate::state::State;
 use crate::table::{ALL_PARTS, Layout, Part, Table, Variable};
@@ -219,9 +219,12 @@ impl<M: Model> Instance<M> {
 
     fn compute(&mut self, needed: u8) -> Result<(), Fault> {
         self.tuned()?;
-        let State { values, model, x, places, discrete: d, fresh, .. } = &mut self.state;
+        let State { phase, values, model, x, places, discrete: d, fresh, .. } = &mut self.state;
         let Some(model) = model else { return Ok(()) };
         let t = values[0];
+        if *phase == Phase::InitializationMode {
+            *d = model.with_system(Begin { x, u: &values[Layout::<M>::INPUTS], d });
+        }
         for part in Part::ALL {
             if needed & !*fresh & part.bit() == 0 {
                 continue;

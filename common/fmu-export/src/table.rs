@@ -207,6 +207,9 @@ impl Table {
         let component = self.variables[unknown].name.rsplit('.').next().unwrap_or_default();
         let covers = |name: &str| {
             depends.iter().any(|d| {
+                if let Some(alone) = d.strip_prefix('=') {
+                    return name == alone;
+                }
                 if let Some(same) = d.strip_suffix('@') {
                     return name.strip_prefix(same) == Some(component);
                 }

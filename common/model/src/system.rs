@@ -110,6 +110,17 @@ pub trait System<const N: usize, const Z: usize> {
         given: &<Self::Model as Model>::Motion<f64>,
     ) -> Result<([f64; N], <Self::Model as Model>::Discrete), ParameterError>;
 
+    /// Discrete states at the end of initialisation, when the inputs are known; until then again with
+    /// every change of an input.
+    fn begin(
+        &self,
+        _x: &[f64; N],
+        _u: &<Self::Model as Model>::Inputs<f64>,
+        d: &<Self::Model as Model>::Discrete,
+    ) -> <Self::Model as Model>::Discrete {
+        *d
+    }
+
     /// Time derivative of the states.
     ///
     /// # Errors
