@@ -159,3 +159,40 @@ def test_what_the_fmu_refuses_is_passed_on(fmu):
     scene.set("upper", mass=-1.0)
     with pytest.raises(FmuError, match=r"mass"):
         scene.run(integrator="rk4", step=0.01)
+
+
+def test_bias_force_of_a_heavy_follower_alone_is_refused(fmu):
+    """A leader without a slot for inertia takes massless followers only; here the inertia is left out by hand."""
+    scene = library.scene("two_mass", fmu)
+    plain = Scene("plain", fmu)
+    for component in scene.components.values():
+        plain.add(component.name, component.fmu, **component.values)
+    plain.connect_all([c for c in scene.connections if not c.target[1].endswith(".M")])
+    with pytest.raises(SceneError, match=r"follower.A.F0 is passed on without the inertia behind it, A.M = 3 kg"):
+        plain.run(integrator="rk4", step=0.01, stop=0.1, interval=0.1)
+    plain.set("follower", **{"root.mass": 0.0})
+    plain.run(integrator="rk4", step=0.01, stop=0.1, interval=0.1)
+
+
+def test_common_needs_model_exchange(fmu, monkeypatch):
+    monkeypatch.setattr(fmu("link2").description, "modelExchange", None)
+    scene = library.scene("double_pendulum", fmu)
+    with pytest.raises(SceneError, match=r"upper \(link2.fmu\) has no Model Exchange"):
+        scene.run(integrator="rk4", step=0.01)
+    scene.run(method="jacobi", H=0.01, stop=0.1)
+
+
+def test_stabilisation_that_is_too_fast_is_mentioned(fmu):
+    scene = library.scene("four_bar", fmu)
+    run = lambda alpha: scene.run(integrator="rk4", step=0.015, stop=0.03, alpha=alpha).messages
+    assert run(2.0) == []
+    (message,) = run(100.0)
+    assert "alpha H = 1.5 is above 1" in message.text
+
+
+def test_H_of_a_run_counts_before_the_step_of_the_scene(fmu):
+    scene = library.scene("double_pendulum", fmu)
+    scene.configure(integrator="rk4", step=0.01)
+    assert scene.run(record=False).counts["steps"] == 200
+    assert scene.run(record=False, H=0.005).counts["steps"] == 400
+    assert scene.run(record=False, step=0.0025).counts["steps"] == 800

@@ -199,3 +199,19 @@ def test_loops_that_are_not_affine_are_reported(fmu):
     scene.connect("two.B", "one.A")
     with pytest.raises((SceneError, np.linalg.LinAlgError)):
         scene.run(integrator="rk4", step=0.01, stop=0.01, interval=0.01)
+
+
+@pytest.mark.parametrize("start", [0.5, 0.5003])
+def test_a_discontinuity_is_announced(fmu, start):
+    """Kinks of the force are communication points, wherever they lie, and components forget there what they knew of their
+    inputs (port.reset): cs pece k = 1 keeps order 3 across. With inputs interpolated over the kink it has order 2."""
+    scene, _ = road(fmu)
+    scene.set("load", **{"force.pulse.start": start})
+    options = {"stop": 0.8, "interval": 0.01}
+    exact = scene.run(integrator="rk4", step=1e-3, **options)[THETA]
+    runs = [scene.run(method="cs-pece", H=H, values=scenes.fixed("rk4", H), **options) for H in (1e-3, 5e-4)]
+    errors = [np.abs(run[THETA] - exact).max() for run in runs]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(3.0, abs=0.3), errors
+    # a kink between two points is one more
+    between = 0 if start == 0.5 else 2
+    assert [run.counts["steps"] for run in runs] == [800 + between, 1600 + between]

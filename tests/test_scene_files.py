@@ -155,3 +155,22 @@ def test_settings_and_samples_come_back(fmu, tmp_path):
     ):
         assert getattr(back, what) == getattr(scene, what), what
     assert {c.name: c.values for c in back.components.values()} == {c.name: c.values for c in scene.components.values()}
+
+
+def test_variants_are_other_root_files(fmu, tmp_path):
+    scene = library.scene("double_wishbone", fmu, load=False)
+    scene.write(tmp_path).rename(tmp_path / "internal.ssd")
+    library.scene("double_wishbone", fmu).write(tmp_path)
+    assert len(Scene.read(tmp_path, fmu).components) == 4
+    assert len(Scene.read(tmp_path, fmu, variant="internal.ssd").components) == 3
+
+
+def test_only_components_of_the_scene_are_loaded_from_an_archive(fmu, tmp_path):
+    """The archive holds every FMU; what the scene does not name is not unpacked, and the report says so."""
+    path = packed(tmp_path, "double_pendulum")
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("resources/unused.fmu", b"not even an archive")
+    with Scene.read(path) as scene:
+        result = scene.run(integrator="rk4", step=0.01, stop=0.1)
+    assert result.components == (2, 2)
+    assert set(result.calls) == {"upper", "lower"}

@@ -15,6 +15,8 @@ from .stepping import Bound, Resets, Saved, Treatment
 
 #: Error control: the estimate is this part of the difference of predictor and corrector.
 ESTIMATE = 1.0 / 3.0
+#: Points of time are the same if they differ by less than this part of a step.
+SAME_TIME = 1e-9
 
 
 class CoSimulation:
@@ -69,10 +71,10 @@ class CoSimulation:
         """E, accepted: events, updates."""
         if any(instance.event_needed for instance in self._all):
             self._resets.announce()
-        _, moved = self._network.settle(sweep_first=not swept)
+        self._next_event, moved = self._network.settle(sweep_first=not swept)
         if moved:
             self._resets.announce()
-            self._network.settle()
+            self._next_event, _ = self._network.settle()
 
     def _predict(self, t: float, H: float):
         for response in self._network.responses.values():
@@ -95,21 +97,35 @@ class CoSimulation:
                 points_between(a, b, self._H)
         self._network.initialise(samples[0], samples[-1])
         self._treatment.set("extrapolate", self._order)
-        self._network.settle()
+        self._next_event, _ = self._network.settle()
         recorder.take()
 
     def loop(self, samples: np.ndarray, recorder):
         """From the first sample to the last."""
+        t = float(samples[0])
         for a, b in zip(samples, samples[1:]):
-            if self._tolerance is None:
-                points = points_between(a, b, self._H).tolist()
-                for t, after in zip(points, points[1:]):
-                    self._fixed(t, after - t)
-            else:
-                self._controlled(a, b)
+            points = points_between(a, b, self._H if self._tolerance is None else b - a)
+            for after in points[1:].tolist():
+                t = self._advance(t, after)
             recorder.take()
 
-    def _fixed(self, t: float, H: float):
+    def _advance(self, t: float, after: float) -> float:
+        """To the next communication point, with one more at every time event on the way; returns where it is.
+
+        A point and an event that differ in their last digits are one: a discontinuity must not begin just behind a point.
+        """
+        step = self._fixed if self._tolerance is None else self._controlled
+        near = SAME_TIME * (after - t)
+        while t + near < self._next_event < after - near:
+            event = self._next_event
+            step(t, event)
+            t = event
+        end = self._next_event if abs(self._next_event - after) <= near else after
+        step(t, end)
+        return end
+
+    def _fixed(self, t: float, end: float):
+        H = _reaching(t, end)
         if self._saved is None:
             self._predict(t, H)
             self._enter_event_mode()
@@ -132,8 +148,8 @@ class CoSimulation:
             self._saved.save()
             u = self._network.u.copy()
             while True:
-                H = min(self._H, stop - t)
-                # no sliver before the sample
+                H = min(self._H, _reaching(t, stop))
+                # no sliver before the end
                 H = 0.5 * (stop - t) if H < stop - t < 1.5 * H else H
                 self._predict(t, H)
                 self._evaluate()
@@ -164,3 +180,9 @@ class CoSimulation:
         rtol, atol = self._tolerance
         scale = atol * self._network.nominal[self._motion] + rtol * np.abs(corrected)
         return float(ESTIMATE * np.max(np.abs(corrected - predicted) / scale, initial=0.0))
+
+
+def _reaching(t: float, end: float) -> float:
+    """Step size from t with which t + H, as components add it, is not before the end."""
+    H = end - t
+    return H if t + H >= end else float(np.nextafter(H, np.inf))

@@ -130,6 +130,8 @@ class Scene:
         self.reference: str | None = None
         #: Folder that the scene was read from.
         self.folder: Path | None = None
+        #: FMUs in the archive that the scene was read from.
+        self.archived: int | None = None
         #: Scale of the error of a variable, where it is not its largest value.
         self.norms: dict[str, float] = {}
         self._sources: dict[Ref, Connection] = {}
@@ -359,11 +361,11 @@ class Scene:
         return write(self, folder)
 
     @classmethod
-    def read(cls, source: str | Path, fmus=None) -> "Scene":
-        """The scene in a folder, an `.ssd` file or an `.ssp` archive."""
+    def read(cls, source: str | Path, fmus=None, variant: str = "SystemStructure.ssd") -> "Scene":
+        """The scene in a folder, an `.ssd` file or an `.ssp` archive; `variant`: another root file there."""
         from .ssp import read
 
-        return read(cls, source, fmus)
+        return read(cls, source, fmus, variant)
 
 
 def start_values(component: Component, extra: Mapping[str, Value]) -> dict[str, Value]:

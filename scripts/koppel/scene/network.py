@@ -91,6 +91,10 @@ class Network:
 
     def _instantiate(self, component: Component) -> Instance:
         if self._exchange:
+            if component.fmu.description.modelExchange is None:
+                raise SceneError(
+                    f"{component.name} ({component.fmu.path.name}) has no Model Exchange: use a method on Co-Simulation"
+                )
             return _Sampled(component.fmu, name=component.name)
         event_mode = self._event_mode and component.fmu.capability("hasEventMode")
         return component.fmu.instantiate(event_mode=event_mode, name=component.name)
@@ -140,7 +144,7 @@ class Network:
         read = {self.graph.source[i].source for i in between if i in self.graph.source}
         read |= {o for joint in self.joints for o in joint.wanted}
         self._between = self.compiled(self.graph.plan(between, read)) if discrete else self._all
-        self.has_discrete = bool(discrete)
+        self.has_discrete = any(self.scene.variable(ref).variability == "discrete" for ref in inputs | outputs)
         self._write_all = [
             self._access(name, refs, self.u, self.inputs_at(refs), write=True)
             for name, refs in self._by_component(inputs - discrete)
@@ -255,9 +259,25 @@ class Network:
         self.time = start
         self.each(lambda instance: instance.enter_initialisation(start, stop))
         self.first_sweep()
+        self._refuse_lost_inertia()
         if self.closure:
             self.closure.start()
         self.each(lambda instance: instance.check("fmi3ExitInitializationMode"))
+
+    def _refuse_lost_inertia(self):
+        """Bias force without inertia is the whole load of massless followers only."""
+        for source in {c.source for c in self.graph.source.values()}:
+            inertia = ports.inertia_of_bias(self._component(source).fmu, source[1])
+            if not inertia or any((source[0], name) in self._at_y for name in inertia):
+                continue
+            values = self.instances[source[0]].get_all(inertia)
+            heavy = {name: value for name, value in values.items() if value != 0.0}
+            if heavy:
+                name, value = next(iter(heavy.items()))
+                raise SceneError(
+                    f"{'.'.join(source)} is passed on without the inertia behind it, {name} = {value:g} kg: its leader "
+                    "takes massless followers only"
+                )
 
     def settle(self, sweep_first: bool = True) -> tuple[float, bool]:
         """Event Mode of all: sweep and update until none asks for more. Time of the next event; whether states moved."""

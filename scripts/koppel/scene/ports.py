@@ -130,6 +130,16 @@ def force_pairs(leader: Port, follower: Port, axes: tuple[str, ...], slot: int, 
     return pairs + list(zip(inertia, accepting))
 
 
+def inertia_of_bias(fmu: Fmu, name: str) -> list[str]:
+    """Names of the inertia that belongs to a component of a bias force; none for other variables."""
+    found = re.fullmatch(r"(.*\.)?F0(\.[xyz])?", name)
+    if found is None:
+        return []
+    whole = f"{found[1] or ''}M"
+    names = [f"{whole}.{pair}" for pair in PAIRS] if found[2] else [whole]
+    return [one for one in names if one in fmu.variables]
+
+
 def constant(fmu: Fmu, name: str) -> bool:
     """An output that is declared to depend on nothing."""
     return fmu.dependencies(name) == frozenset()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..fmu import FmuError, Status, Value
+from ..fmu import FmuError, Message, Status, Value
 from .common import Common
 from .cosimulation import CoSimulation
 from .definition import FIXED_STEP, Scene
@@ -38,6 +38,8 @@ def run(
     cs-pece follows the error (rtol, atol), H is the first. Others: fields of `Settings`, for this run.
     """
     chosen = replace(scene.settings, **settings)
+    if "H" in settings and "step" not in settings:
+        chosen = replace(chosen, step=None)  # for this run H is the step of the common integrator
     samples = sample_times(
         scene.start if start is None else start,
         scene.stop if stop is None else stop,
@@ -55,7 +57,7 @@ def run(
         recorder = Recorder(network, scene.recorded, audit, len(samples)) if record or audit else Unrecorded()
         with np.errstate(over="ignore", invalid="ignore"):
             wall, cpu = _timed(method, network, samples, recorder)
-        return _result(scene, chosen.method, network, method, samples, recorder, wall, cpu)
+        return _result(scene, chosen.method, network, method, samples, recorder, wall, cpu, _warnings(scene, chosen))
 
 
 def _method(network: Network, chosen, controlled: bool, raw: bool):
@@ -73,6 +75,17 @@ def _method(network: Network, chosen, controlled: bool, raw: bool):
         raise SceneError("order = 0: cs-pece has k = 1 or 2")
     tolerance = (chosen.rtol, chosen.atol) if controlled else None
     return CoSimulation(network, chosen.H, chosen.order, correct, tolerance)
+
+
+def _warnings(scene: Scene, chosen) -> list[Message]:
+    """What is allowed but probably not meant."""
+    step = (chosen.step or chosen.H) if chosen.method == "common" else chosen.H
+    fixed = chosen.method != "common" or chosen.integrator in FIXED_STEP
+    # a step that is 1/alpha by its digits may be a last bit above
+    if not (scene.joints and fixed and chosen.alpha * step > 1.0 + 1e-9):
+        return []
+    text = f"alpha H = {chosen.alpha * step:g} is above 1: the stabilisation is faster than the steps can follow"
+    return [Message(Status.WARNING, "scene", text)]
 
 
 def _timed(method, network: Network, samples: np.ndarray, recorder) -> tuple[float, float]:
@@ -94,7 +107,7 @@ def _reasonable(network: Network) -> bool:
     return bool((np.isfinite(values) & (np.abs(values) < 1e9)).all())
 
 
-def _result(scene: Scene, name: str, network: Network, method, samples, recorder, wall, cpu) -> SceneResult:
+def _result(scene: Scene, name: str, network: Network, method, samples, recorder, wall, cpu, warnings) -> SceneResult:
     calls = network.counts()
     evaluations = _component_evaluations(network, method)
     recorded = isinstance(recorder, Recorder)
@@ -116,13 +129,13 @@ def _result(scene: Scene, name: str, network: Network, method, samples, recorder
             "sweeps": network.sweeps,
             **kinds(calls),
         },
-        messages=[message for instance in network.instances.values() for message in instance.messages],
+        messages=warnings + [message for instance in network.instances.values() for message in instance.messages],
         method=name,
         calls=calls,
         gap=gaps[:, 0],
         gap_rate=gaps[:, 1],
         energy=audited(recorder.energy_refs, recorder.energies) if recorded else None,
-        components=(len(fmus), _archives(fmus)),
+        components=(len(fmus), _archives(fmus) if scene.archived is None else scene.archived),
         variables=(
             len(network.u) + len(network.y),
             sum(len(fmu.names("input")) + len(fmu.names("output")) for fmu in fmus),

@@ -192,16 +192,16 @@ def _units(scene: Scene) -> list[_Element]:
 class _Source:
     """Where a scene file and its resources are: a folder, or an archive from which only what is used is unpacked."""
 
-    def __init__(self, source: str | Path):
+    def __init__(self, source: str | Path, variant: str = FILE):
         path = Path(source)
         self.path, self._unpacked = path, None
         if path.suffix == ".ssp":
             if not path.is_file():
                 raise SceneError(f"no archive {path}")
             self._unpacked = tempfile.TemporaryDirectory(prefix="koppel-")
-            self.folder, self.file = Path(self._unpacked.name), FILE
+            self.folder, self.file = Path(self._unpacked.name), variant
         else:
-            self.folder, self.file = (path.parent, path.name) if path.suffix == ".ssd" else (path, FILE)
+            self.folder, self.file = (path.parent, path.name) if path.suffix == ".ssd" else (path, variant)
 
     def resource(self, name: str) -> Path | None:
         """Path of a file inside, None if it is not there."""
@@ -225,6 +225,14 @@ class _Source:
         except ElementTree.ParseError as wrong:
             raise SceneError(f"{self.path}: {self.file} is no XML: {wrong}") from None
 
+    @property
+    def archived(self) -> int | None:
+        """FMUs in the archive, None for a folder."""
+        if not self._unpacked:
+            return None
+        with zipfile.ZipFile(self.path) as archive:
+            return sum(name.endswith(".fmu") for name in archive.namelist())
+
     def close(self):
         """Remove what was unpacked."""
         if self._unpacked:
@@ -243,9 +251,12 @@ def _all(element: ElementTree.Element | None, *path: str) -> list[ElementTree.El
     return found
 
 
-def read(cls: type[Scene], source: str | Path, fmus=None) -> Scene:
-    """The scene in a folder, `.ssd` file or `.ssp` archive. FMUs that it does not hold are looked for in `fmus`."""
-    where = _Source(source)
+def read(cls: type[Scene], source: str | Path, fmus=None, variant: str = FILE) -> Scene:
+    """The scene in a folder, `.ssd` file or `.ssp` archive. FMUs that it does not hold are looked for in `fmus`.
+
+    `variant`: another root file of the folder or archive.
+    """
+    where = _Source(source, variant)
     scene = None
     try:
         root = where.root()
@@ -257,6 +268,7 @@ def read(cls: type[Scene], source: str | Path, fmus=None) -> Scene:
         for experiment in _all(root, "DefaultExperiment"):
             scene.start = float(experiment.get("startTime", scene.start))
             scene.stop = float(experiment.get("stopTime", scene.stop))
+        scene.archived = where.archived
         scene.folder = None if where.path.suffix == ".ssp" else where.folder
         return scene
     except BaseException:
