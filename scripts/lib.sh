@@ -2,6 +2,7 @@
 # Shared by the scripts. After sourcing, the working directory is the root of the repository.
 
 NEXTEST_VERSION=0.9.143
+FMI_VERSIONS=(2 3)
 
 # a relative CARGO_TARGET_DIR counts from where the script was called, as it does for cargo
 if [[ -n ${CARGO_TARGET_DIR:-} ]]; then

@@ -661,6 +661,10 @@ class Equations(Instance):
     def go_on(self):
         """Event Mode, with all updates done, -> Continuous-Time Mode; `x` is read."""
         self.check("fmi3EnterContinuousTimeMode")
+        self.read_states()
+
+    def read_states(self):
+        """Get the states into `x`."""
         if self.nx:
             self._read_states()
 

@@ -130,6 +130,16 @@ impl<M: Model> Visitor<M> for Nominals<'_> {
     }
 }
 
+/// Number of states.
+pub(crate) struct Size;
+
+impl<M: Model> Visitor<M> for Size {
+    type Output = usize;
+    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, _system: &Y) -> usize {
+        N
+    }
+}
+
 /// True if the states have left their manifold.
 pub(crate) struct Astray<'a> {
     pub(crate) x: &'a [f64],

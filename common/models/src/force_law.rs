@@ -9,6 +9,7 @@ use std::f64::consts::PI;
 
 use mechanics::{Dim, Scalar, Space, Vector};
 use model::{Variables, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// Parameters of a load.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
@@ -38,7 +39,7 @@ pub struct LoadParameters {
 }
 
 /// Where the time stands relative to the pulse; changed by the time events at both ends.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PulsePhase {
     /// Not yet begun
     #[default]

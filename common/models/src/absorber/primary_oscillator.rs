@@ -21,6 +21,7 @@ use model::{
     Dense, EvaluationError, Experiment, Matrix, Model, ParameterError, Spectrum, SymmetricTensor, System,
     Vector3, Visitor,
 };
+use serde::{Deserialize, Serialize};
 
 use super::primary_variables::{Dynamics, Energy, Inertia, Inputs, Motion, Parameters, PortKind};
 use crate::port::slots;
@@ -39,7 +40,7 @@ pub struct PrimaryOscillator {
 }
 
 /// What stays constant after initialisation.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Base {
     /// e . A.r at the end of initialisation [m]
     start: f64,

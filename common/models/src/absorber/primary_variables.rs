@@ -124,91 +124,25 @@ pub struct Inputs<S> {
     pub drive_force: S,
 }
 
-// What depends on what, united over all settings; `=P.F` is the scalar variable alone, not P.F.x.
+// What depends on what, united over all settings; `=P.F` is the scalar variable alone, `P.F.*` the vector alone.
 
 const POSITION: &[&str] = &["A.r", "s"];
-const VELOCITY: &[&str] = &["A.v.x", "A.v.y", "A.v.z", "v"];
+const VELOCITY: &[&str] = &["A.v.*", "v"];
 /// Force of the lowest spring and damper.
 const T_1: &[&str] = &["=A.s", "=A.v", "s[1]", "v[1]"];
 /// Accelerations in one coordinate.
 const SCALAR: &[&str] =
     &["=P.F", "=P.M", "=P.slot[2].F", "=P.slot[2].M", "=A.s", "=A.v", "drive.force", "s", "v"];
-/// The same in space; with the bias of the base only.
-const SPATIAL_BIAS: &[&str] = &[
-    "P.F.x",
-    "P.F.y",
-    "P.F.z",
-    "P.M.xx",
-    "P.M.xy",
-    "P.M.xz",
-    "P.M.yy",
-    "P.M.yz",
-    "P.M.zz",
-    "P.slot[2].F.x",
-    "P.slot[2].F.y",
-    "P.slot[2].F.z",
-    "P.slot[2].M.xx",
-    "P.slot[2].M.xy",
-    "P.slot[2].M.xz",
-    "P.slot[2].M.yy",
-    "P.slot[2].M.yz",
-    "P.slot[2].M.zz",
-    "A.r",
-    "A.v.x",
-    "A.v.y",
-    "A.v.z",
-    "drive.force",
-    "s",
-    "v",
-];
-const SPATIAL_INERTIA: &[&str] = &[
-    "P.M.xx",
-    "P.M.xy",
-    "P.M.xz",
-    "P.M.yy",
-    "P.M.yz",
-    "P.M.zz",
-    "P.slot[2].M.xx",
-    "P.slot[2].M.xy",
-    "P.slot[2].M.xz",
-    "P.slot[2].M.yy",
-    "P.slot[2].M.yz",
-    "P.slot[2].M.zz",
-];
-const SPATIAL: &[&str] = &[
-    "P.F.x",
-    "P.F.y",
-    "P.F.z",
-    "P.M.xx",
-    "P.M.xy",
-    "P.M.xz",
-    "P.M.yy",
-    "P.M.yz",
-    "P.M.zz",
-    "P.slot[2].F.x",
-    "P.slot[2].F.y",
-    "P.slot[2].F.z",
-    "P.slot[2].M.xx",
-    "P.slot[2].M.xy",
-    "P.slot[2].M.xz",
-    "P.slot[2].M.yy",
-    "P.slot[2].M.yz",
-    "P.slot[2].M.zz",
-    "A.r",
-    "A.v.x",
-    "A.v.y",
-    "A.v.z",
-    "A.a.x",
-    "A.a.y",
-    "A.a.z",
-    "drive.force",
-    "s",
-    "v",
-];
+/// Loads, springs and drive in space.
+const SPATIAL_BIAS: &[&str] =
+    &["P.F.*", "P.M.*", "P.slot[2].F.*", "P.slot[2].M.*", "A.r", "A.v.*", "drive.force", "s", "v"];
+const SPATIAL_INERTIA: &[&str] = &["P.M.*", "P.slot[2].M.*"];
+/// The same with the acceleration of the base.
+const SPATIAL: &[&str] =
+    &["P.F.*", "P.M.*", "P.slot[2].F.*", "P.slot[2].M.*", "A.r", "A.v.*", "A.a.*", "drive.force", "s", "v"];
 /// The first mass hangs on the base, the second on the first.
-const MASS_1: &[&str] =
-    &["P.F", "P.M", "P.slot[2]", "=A.s", "A.r", "A.v", "A.a.x", "A.a.y", "A.a.z", "drive.force", "s", "v"];
-const MASS_2: &[&str] = &["P.F", "P.M", "P.slot[2]", "A.a.x", "A.a.y", "A.a.z", "drive.force", "s", "v"];
+const MASS_1: &[&str] = &["P.F", "P.M", "P.slot[2]", "=A.s", "A.r", "A.v", "A.a.*", "drive.force", "s", "v"];
+const MASS_2: &[&str] = &["P.F", "P.M", "P.slot[2]", "A.a.*", "drive.force", "s", "v"];
 const WORK: &[&str] = &["P.F", "P.M", "P.slot[2]", "A", "drive.force", "s", "v"];
 
 /// Displacements and ports.

@@ -14,6 +14,7 @@ use model::{
     Dense, Enumeration, EvaluationError, Experiment, Model, NoVariables, ParameterError, System, Variables,
     Vector3, Visitor,
 };
+use serde::{Deserialize, Serialize};
 
 use crate::port::{ScalarSlot, Slot, slots};
 
@@ -293,7 +294,7 @@ impl Guide {
 }
 
 /// Time of the next kink; infinite: none.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NextKink(f64);
 
 impl Default for NextKink {
