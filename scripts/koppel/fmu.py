@@ -179,8 +179,11 @@ class Fmu:
 
     def capability(self, attribute: str) -> bool:
         """A flag of the CoSimulation element, false unless declared (fmpy reads some of them under FMI 2.0 names)."""
-        element = ElementTree.parse(self.folder / "modelDescription.xml").getroot().find("CoSimulation")
-        return element.get(attribute, "false") in ("true", "1")
+        return self._co_simulation.get(attribute, "false") in ("true", "1")
+
+    @cached_property
+    def _co_simulation(self) -> dict[str, str]:
+        return ElementTree.parse(self.folder / "modelDescription.xml").getroot().find("CoSimulation").attrib
 
     def variable(self, name: str):
         """Description of a variable."""
