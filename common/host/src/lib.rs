@@ -1,0 +1,11 @@
+//! Runs scenes of FMUs: import, sweep, closures, methods, studies.
+//!
+//! | module | what it does |
+//! | --- | --- |
+//! | [`import`] | FMUs of FMI 2.0 and 3.0: archive, description, instances (the only unsafe code, `import::binding`) |
+//! | [`xml`] | XML as a tree |
+
+#![allow(rustdoc::broken_intra_doc_links, reason = "units stand in brackets")]
+
+pub mod import;
+pub mod xml;
