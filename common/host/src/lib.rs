@@ -3,9 +3,11 @@
 //! | module | what it does |
 //! | --- | --- |
 //! | [`import`] | FMUs of FMI 2.0 and 3.0: archive, description, instances (the only unsafe code, `import::binding`) |
+//! | [`ssp`] | scene files |
 //! | [`xml`] | XML as a tree |
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "units stand in brackets")]
 
 pub mod import;
+pub mod ssp;
 pub mod xml;
