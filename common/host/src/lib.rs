@@ -8,6 +8,14 @@
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "units stand in brackets")]
 
+pub mod closure;
+pub mod error;
 pub mod import;
+pub mod methods;
+pub mod record;
+pub mod run;
+pub mod scene;
 pub mod ssp;
+pub mod start;
+pub mod sweep;
 pub mod xml;

@@ -58,8 +58,10 @@ pub struct ExplicitSolver {
 struct LastStep {
     t: f64,
     h: f64,
+    t_end: f64,
     x: Vec<f64>,
     end: Vec<f64>,
+    /// Stages, and in the last row room for the slope at the end
     k: Vec<Vec<f64>>,
     /// Stages of steps repeated with another length
     again: Vec<Vec<f64>>,
@@ -102,9 +104,10 @@ impl ExplicitSolver {
         let step = LastStep {
             t: 0.0,
             h: 0.0,
+            t_end: 0.0,
             x: vec![0.0; n],
             end: vec![0.0; n],
-            k: vec![vec![0.0; n]; table.all_stages()],
+            k: vec![vec![0.0; n]; table.all_stages() + 1],
             again: vec![vec![0.0; n]; table.stages()],
             slope: None,
             extended: false,
@@ -166,6 +169,7 @@ impl ExplicitSolver {
             t_end
         };
         self.statistics.steps += 1;
+        self.step.t_end = reached;
         Ok(reached)
     }
 
@@ -173,6 +177,23 @@ impl ExplicitSolver {
     #[must_use]
     pub fn state(&self) -> &[f64] {
         &self.step.end
+    }
+
+    /// Slope at the end of the last step, evaluated if it is not known; the next step begins with it.
+    ///
+    /// Afterwards the last evaluation was one at the end, unless others came in between.
+    ///
+    /// # Errors
+    /// Those of the right-hand side.
+    pub fn slope<O: DynamicOde>(&mut self, ode: &mut O) -> Result<&[f64], StepError<O::Error>> {
+        let Self { step, statistics, .. } = self;
+        let spare = step.k.len() - 1;
+        let stage = match step.slope {
+            Some(stage) => stage,
+            None => rhs(ode, step.t_end, &step.end, &mut step.k[spare], statistics).map(|()| spare)?,
+        };
+        step.slope = Some(stage);
+        Ok(&step.k[stage])
     }
 
     /// Start and length of the last step [s].
@@ -379,7 +400,10 @@ impl ExplicitSolver {
             return Ok(());
         }
         let first = dop853::STAGES;
-        rhs(ode, step.t + step.h, &step.end, &mut step.k[first], statistics)?;
+        match step.slope {
+            Some(stage) => step.k[first] = step.k[stage].clone(),
+            None => rhs(ode, step.t_end, &step.end, &mut step.k[first], statistics)?,
+        }
         for (i, (row, c)) in dop853::A_DENSE.iter().zip(dop853::C_DENSE).enumerate() {
             moved(&step.x, step.h, row, &step.k, scratch);
             rhs(ode, step.t + c * step.h, scratch, &mut step.k[first + 1 + i], statistics)?;

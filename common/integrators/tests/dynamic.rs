@@ -92,3 +92,22 @@ fn implicit_methods_are_refused() {
     let refused = ExplicitSolver::new(settings(Method::Radau5), vec![1.0; 4]).err();
     assert_eq!(refused, Some(NotExplicit::Method(Method::Radau5)));
 }
+
+/// The slope asked for at the end of a step is the first stage of the next one: no evaluation more.
+#[test]
+fn a_slope_at_the_end_starts_the_next_step() {
+    for method in [Method::Rk4, Method::Dop853] {
+        let mut solver = ExplicitSolver::new(settings(method), vec![1.0; 4]).unwrap();
+        let (mut t, mut x) = (0.0, START.to_vec());
+        while t < T_END {
+            t = solver.step(&mut Kepler, t, &x, T_END).unwrap();
+            x.copy_from_slice(solver.state());
+            let mut direct = vec![0.0; 4];
+            DynamicOde::rhs(&mut Kepler, t, &x, &mut direct).unwrap();
+            assert_eq!(solver.slope(&mut Kepler).unwrap(), direct);
+        }
+        let (plain, end) = dynamic(method);
+        assert_eq!(end, x, "{method:?}");
+        assert_eq!(solver.statistics.rhs_evaluations, plain.statistics.rhs_evaluations + 1, "{method:?}");
+    }
+}

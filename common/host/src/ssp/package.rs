@@ -71,7 +71,8 @@ impl Package {
     /// # Errors
     /// A missing file, or a path that leads out of the scene.
     pub fn read(&self, name: &str) -> Result<Vec<u8>, SspError> {
-        let inside = Path::new(name).components().all(|part| matches!(part, PathPart::Normal(_) | PathPart::CurDir));
+        let inside =
+            Path::new(name).components().all(|part| matches!(part, PathPart::Normal(_) | PathPart::CurDir));
         if !inside {
             return Err(SspError::Outside { name: name.into() });
         }

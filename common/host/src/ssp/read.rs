@@ -138,7 +138,8 @@ impl Reader<'_> {
             system.connections.push(self.connection(element)?);
         }
         self.system_parameters(inner, &mut system)?;
-        if let Some(experiment) = root.child("DefaultExperiment").or_else(|| inner.child("DefaultExperiment")) {
+        if let Some(experiment) = root.child("DefaultExperiment").or_else(|| inner.child("DefaultExperiment"))
+        {
             system.start = self.optional(experiment, "startTime")?;
             system.stop = self.optional(experiment, "stopTime")?;
         }
@@ -237,9 +238,9 @@ impl Reader<'_> {
     fn connection(&self, element: &Element) -> Result<Connection, SspError> {
         let end = |component, connector| {
             // the system's own connectors have no element
-            let component = element
-                .attribute(component)
-                .ok_or_else(|| self.problem(element, Problem::Unsupported("a connection to the system's border")))?;
+            let component = element.attribute(component).ok_or_else(|| {
+                self.problem(element, Problem::Unsupported("a connection to the system's border"))
+            })?;
             Ok::<_, SspError>((component.to_owned(), self.required(element, connector)?.to_owned()))
         };
         let transformation = element.children.iter().find(|c| c.name.ends_with("Transformation"));
@@ -277,7 +278,8 @@ impl Reader<'_> {
                     settings.alpha = self.optional(element, "alpha")?;
                 }
                 "joint" => {
-                    let [first, second] = [self.required(element, "first")?, self.required(element, "second")?];
+                    let [first, second] =
+                        [self.required(element, "first")?, self.required(element, "second")?];
                     settings.joints.push((first.into(), second.into()));
                 }
                 "assemble" => settings.assemble.extend(words(element, "variables")?),
@@ -287,7 +289,9 @@ impl Reader<'_> {
                 }
                 "reference" => settings.reference = Some(self.required(element, "file")?.into()),
                 "norm" => {
-                    settings.norms.push((self.required(element, "variable")?.into(), self.number(element, "value")?));
+                    settings
+                        .norms
+                        .push((self.required(element, "variable")?.into(), self.number(element, "value")?));
                 }
                 _ => return Err(self.problem(element, Problem::Unsupported("this entry of the scene"))),
             }
