@@ -10,6 +10,49 @@ fn root() -> PathBuf {
 }
 
 #[test]
+fn cs() {
+    for (method, order, step) in [
+        ("jacobi", 1, 0.005),
+        ("jacobi", 1, 0.00125),
+        ("seidel", 1, 0.005),
+        ("cs-predict", 1, 0.00125),
+        ("cs-pece", 1, 0.005),
+        ("cs-pece", 2, 0.005),
+    ] {
+        let scene = Scene::load(
+            &Path::new("/tmp/scenes_copy").join("double_pendulum"),
+            &root().join("dist/fmi3"),
+            None,
+        )
+        .unwrap();
+        let choices = Choices {
+            method: Some(method.into()),
+            order: Some(order),
+            step: Some(step),
+            ..Choices::default()
+        };
+        let config = Config::new(&scene.system, &choices).unwrap();
+        let mut recorder = scene.recorder(&config);
+        let o: Vec<_> = ["upper", "lower"]
+            .iter()
+            .flat_map(|n| {
+                [
+                    (format!("{n}.solver.step"), host::ssp::ParameterValue::Real(step)),
+                    (format!("{n}.solver.method"), host::ssp::ParameterValue::Text("rk4".into())),
+                ]
+            })
+            .collect();
+        match scene.run(&config, &o, &mut recorder, &mut |_| ()) {
+            Ok(cost) => {
+                eprintln!("{method} {order} {step} {:?}", recorder.rows.last());
+                eprintln!("{cost:?}");
+            }
+            Err(e) => eprintln!("{method}: {e}"),
+        }
+    }
+}
+
+#[test]
 fn dp() {
     for (name, step) in [
         ("double_pendulum", 0.005),

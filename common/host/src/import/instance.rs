@@ -9,8 +9,10 @@ use super::{Capabilities, Fmu, Value, VariableKind};
 /// How an instance is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
-    /// The FMU holds its solver
+    /// The FMU holds its solver; Event Mode is used where there is one
     CoSimulation,
+    /// The same without Event Mode, as a plain host does it
+    PlainCoSimulation,
     /// The host holds the solver
     ModelExchange,
 }
@@ -18,7 +20,7 @@ pub enum Interface {
 impl fmt::Display for Interface {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::CoSimulation => "Co-Simulation",
+            Self::CoSimulation | Self::PlainCoSimulation => "Co-Simulation",
             Self::ModelExchange => "Model Exchange",
         })
     }
@@ -105,20 +107,17 @@ impl Instance {
         identity: &Identity<'_>,
         interface: Interface,
     ) -> Result<Self, (Fault, Vec<String>)> {
+        let events =
+            interface == Interface::CoSimulation && fmu.capabilities(interface).is_some_and(|c| c.event_mode);
         let inner = match (library, interface) {
-            (Library::V2(l), Interface::CoSimulation) => {
-                Version::V2(fmi2::Instance::co_simulation(l, identity)?)
-            }
             (Library::V2(l), Interface::ModelExchange) => {
                 Version::V2(fmi2::Instance::model_exchange(l, identity)?)
             }
-            (Library::V3(l), Interface::CoSimulation) => {
-                let events = fmu.capabilities(interface).is_some_and(|c| c.event_mode);
-                Version::V3(fmi3::Instance::co_simulation(l, identity, events)?)
-            }
+            (Library::V2(l), _) => Version::V2(fmi2::Instance::co_simulation(l, identity)?),
             (Library::V3(l), Interface::ModelExchange) => {
                 Version::V3(fmi3::Instance::model_exchange(l, identity)?)
             }
+            (Library::V3(l), _) => Version::V3(fmi3::Instance::co_simulation(l, identity, events)?),
         };
         Ok(Self { inner, fmu, interface, counts: Counts::default() })
     }

@@ -143,7 +143,7 @@ impl Fmu {
     #[must_use]
     pub fn capabilities(&self, interface: Interface) -> Option<&Capabilities> {
         match interface {
-            Interface::CoSimulation => self.description.co_simulation.as_ref(),
+            Interface::CoSimulation | Interface::PlainCoSimulation => self.description.co_simulation.as_ref(),
             Interface::ModelExchange => self.description.model_exchange.as_ref(),
         }
     }

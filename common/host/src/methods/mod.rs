@@ -4,6 +4,7 @@ mod common;
 mod cosimulation;
 mod events;
 mod exchange;
+mod inputs;
 mod settings;
 
 pub use settings::{Choices, Config, MethodKind, integrator_name};
@@ -37,7 +38,8 @@ impl MethodKind {
     pub fn interface(self) -> Interface {
         match self {
             Self::Common => Interface::ModelExchange,
-            _ => Interface::CoSimulation,
+            Self::CsPredict | Self::CsPece => Interface::CoSimulation,
+            Self::Jacobi | Self::Seidel => Interface::PlainCoSimulation,
         }
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::rc::Rc;
 
 use super::SceneError;
+use super::order::{Role, role};
 use crate::import::{Causality, Fmu, Variable, VariableKind};
 use crate::ssp::{Connection, Package, System};
 
@@ -174,6 +175,40 @@ impl Network {
     pub fn find(&self, name: &str, place: &str) -> Result<(usize, &Variable), SceneError> {
         let (node, name) = split(&self.nodes, name, place)?;
         Ok((node, variable(&self.nodes[node], name, place)?))
+    }
+
+    /// Whether a signal is a position or velocity of a port.
+    #[must_use]
+    pub fn is_motion(&self, signal: usize) -> bool {
+        role(&self.signals[signal].name) == Role::Motion
+    }
+
+    /// Whether a signal changes at events only.
+    #[must_use]
+    pub fn is_discrete(&self, signal: usize) -> bool {
+        let signal = &self.signals[signal];
+        let description = &self.nodes[signal.node].fmu.description;
+        description.variable(&signal.name).is_some_and(|v| v.discrete)
+    }
+
+    /// Components in the order in which motion goes from one to the next.
+    #[must_use]
+    pub fn leaders_first(&self) -> Vec<usize> {
+        let leads = |sink: &Sink| {
+            sink.source.filter(|s| self.is_motion(s.signal)).map(|s| self.signals[s.signal].node)
+        };
+        let mut order: Vec<usize> = Vec::new();
+        while order.len() < self.nodes.len() {
+            let waits = |node: usize| {
+                let of_node = self.sinks.iter().filter(|s| s.node == node);
+                of_node.filter_map(leads).any(|leader| !order.contains(&leader) && leader != node)
+            };
+            let open = (0..self.nodes.len()).filter(|node| !order.contains(node));
+            // in a circle of leaders the file decides
+            let next = open.clone().find(|&node| !waits(node)).or_else(|| open.clone().next());
+            order.extend(next);
+        }
+        order
     }
 
     /// Scene name of a signal.

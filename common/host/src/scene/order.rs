@@ -11,7 +11,7 @@ use super::Network;
 
 /// What a signal is to the sweep, in the order of its passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-enum Role {
+pub(super) enum Role {
     /// r, v, s
     Motion,
     /// F0, M
@@ -24,7 +24,7 @@ enum Role {
     Other,
 }
 
-fn role(name: &str) -> Role {
+pub(super) fn role(name: &str) -> Role {
     name.split('.')
         .skip(1)
         .find_map(|part| match part {
