@@ -8,6 +8,7 @@
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "units stand in brackets")]
 
+pub mod cli;
 pub mod closure;
 pub mod error;
 pub mod import;
@@ -17,5 +18,6 @@ pub mod run;
 pub mod scene;
 pub mod ssp;
 pub mod start;
+pub mod study;
 pub mod sweep;
 pub mod xml;

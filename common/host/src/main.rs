@@ -1,1 +1,7 @@
-fn main() {}
+//! The program `koppel`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    host::cli::main()
+}

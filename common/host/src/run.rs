@@ -1,7 +1,6 @@
 //! A scene as a whole: loaded once, run as often as wanted.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use crate::error::Error;
 use crate::import::Counts;
@@ -31,8 +30,6 @@ pub struct Cost {
     pub calls: Counts,
     /// Sweeps
     pub sweeps: u64,
-    /// Wall time of the run, initialisation included [s]
-    pub wall: f64,
 }
 
 impl Scene {
@@ -90,12 +87,21 @@ impl Scene {
     ) -> Result<Cost, Error> {
         let mut sweeper = self.instantiate(config, overrides)?;
         sweeper.reset_counts();
-        let begin = Instant::now();
         let steps = methods::run(&mut sweeper, config, recorder, progress)?;
-        let wall: Duration = begin.elapsed();
         let calls = sweeper.counts();
         let sweeps = sweeper.sweeps;
-        Ok(Cost { steps, calls, sweeps, wall: wall.as_secs_f64() })
+        Ok(Cost { steps, calls, sweeps })
+    }
+
+    /// Closing joints and inputs of affine loops, by their ports and variables.
+    #[must_use]
+    pub fn closures(&self) -> Vec<String> {
+        let joints = self.network.joints.iter().map(|j| format!("joint {}", j.ports.join(" - ")));
+        let cuts = self.plan.cuts.iter().map(|&sink| {
+            let sink = &self.network.sinks[sink];
+            format!("loop through {}.{}", self.network.nodes[sink.node].name, sink.name)
+        });
+        joints.chain(cuts).collect()
     }
 
     /// A recorder for the scene's variables.

@@ -1,6 +1,7 @@
 //! Method `common`: the states of all FMUs in one vector, one integrator, Model Exchange.
 
 use std::ops::Range;
+use std::time::Instant;
 
 use integrators::{DynamicOde, ExplicitSolver, NotExplicit, Settings, StepError};
 
@@ -25,6 +26,7 @@ pub(super) fn run(
     start::initialise(sweeper, config)?;
     let mut run = Run::start(sweeper, config)?;
     recorder.offer(run.ode.sweeper, config, run.t)?;
+    let begin = Instant::now();
     while run.t < config.stop {
         run.step(config, recorder)?;
         progress(run.t);
@@ -36,6 +38,7 @@ pub(super) fn run(
         rhs_evaluations: statistics.rhs_evaluations,
         events: run.events,
         gap: recorder.gap(),
+        seconds: begin.elapsed().as_secs_f64(),
     })
 }
 

@@ -7,6 +7,8 @@
 //! H         <- H min(2, max(0.2, 0.9 error^(-1/(k + 2))))
 //! ```
 
+use std::time::Instant;
+
 use super::exchange::do_step;
 use super::inputs::{Inputs, Treatment};
 use super::{Config, MethodKind, Progress, Steps, events};
@@ -47,11 +49,13 @@ pub(super) fn run(
     };
     run.update()?;
     recorder.offer(run.sweeper, config, run.t)?;
+    let begin = Instant::now();
     let mut result = Ok(());
     while result.is_ok() && run.t < config.stop {
         result = run.advance(recorder);
         progress(run.t);
     }
+    run.steps.seconds = begin.elapsed().as_secs_f64();
     run.forget()?;
     result?;
     run.steps.gap = recorder.gap();

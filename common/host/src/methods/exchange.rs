@@ -5,6 +5,8 @@
 //! seidel   leaders before followers: set, step, get; followers take their inputs as those of the end of the step
 //! ```
 
+use std::time::Instant;
+
 use super::inputs::{Inputs, Treatment};
 use super::{Config, MethodKind, Progress, Steps};
 use crate::error::{Error, RunError};
@@ -31,6 +33,7 @@ pub(super) fn run(
     recorder.offer(sweeper, config, config.start)?;
     let mut steps = Steps::default();
     let mut t = config.start;
+    let begin = Instant::now();
     while t < config.stop {
         steps.accepted += 1;
         let next = config.point(steps.accepted, step);
@@ -43,6 +46,7 @@ pub(super) fn run(
         recorder.offer(sweeper, config, t)?;
         progress(t);
     }
+    steps.seconds = begin.elapsed().as_secs_f64();
     Ok(steps)
 }
 

@@ -30,6 +30,8 @@ pub struct Steps {
     pub events: u64,
     /// Largest distance of a closing joint at a recorded time [m]
     pub gap: f64,
+    /// Wall time from the first step to the last [s]
+    pub seconds: f64,
 }
 
 impl MethodKind {

@@ -1,8 +1,10 @@
 //! Scenes as SSP: archive or folder, system structure, annotation.
 
+mod pack;
 mod package;
 mod read;
 
+pub use pack::pack;
 pub use package::Package;
 pub use read::SspError;
 
