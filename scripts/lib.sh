@@ -1,8 +1,8 @@
 # shellcheck shell=bash disable=SC2034 # the scripts that source this file use the names
 # Shared by the scripts. After sourcing, the working directory is the root of the repository.
 
-LOCK_STAMP=.venv/.locked
 NEXTEST_VERSION=0.9.143
+FMI_VERSIONS=(2 3)
 
 # a relative CARGO_TARGET_DIR counts from where the script was called, as it does for cargo
 if [[ -n ${CARGO_TARGET_DIR:-} ]]; then
@@ -56,6 +56,19 @@ fmu_names() {
 read_fmus() {
     mapfile -t FMUS < <(fmu_names)
     ((${#FMUS[@]} > 0)) || die "no FMU in fmus/"
+}
+
+# locked_venv FOLDER LOCK: a virtual environment with exactly the packages of LOCK; made again when one of them changes
+locked_venv() {
+    local folder=$1 lock=$2 stamp
+    stamp="$(cksum <"$lock") $("$PYTHON" --version)"
+    [[ ! -f $folder/.locked || $(<"$folder/.locked") != "$stamp" ]] || return 0
+    say "Python packages into $folder"
+    rm -rf "$folder"
+    "$PYTHON" -m venv "$folder"
+    "$folder/bin/python" -m pip install --quiet --require-hashes --only-binary=:all: -r "$lock" ||
+        die "the packages of $lock could not be installed; the lines above say why (network, or no wheels for this platform)"
+    printf '%s' "$stamp" >"$folder/.locked"
 }
 
 # venv_python ARGS...: the Python of the virtual environment

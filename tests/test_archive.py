@@ -73,7 +73,8 @@ def test_archive_holds_what_the_project_promises(fmu, name):
 def test_description_follows_the_rules_for_all_fmus(fmu, name):
     description = fmu(name).description
     assert description.fmiVersion == "3.0"
-    for flag in ("canGetAndSetFMUState", "canHandleVariableCommunicationStepSize", "providesDirectionalDerivatives"):
+    flags = ["canGetAndSetFMUState", "canSerializeFMUState", "canHandleVariableCommunicationStepSize"]
+    for flag in [*flags, "providesDirectionalDerivatives", "hasEventMode"]:
         assert fmu(name).capability(flag), flag
     assert description.coSimulation.fixedInternalStepSize is None
     experiment = description.defaultExperiment

@@ -1,7 +1,5 @@
 """What a host may do with an FMU besides stepping it: reset, copies, saved states, other step sizes, tunables."""
 
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -125,105 +123,6 @@ def test_restored_state_repeats_the_run(wishbone, setting):
         instance.restore(saved)
         assert same(first, march(instance, grid(0.5, 1.0, 0.05), names))
         instance.free_state(saved)
-
-
-def refuses_to_serialise(fmu):
-    """Whether serialised states are not offered; then the three functions must say so."""
-    if fmu.capability("canSerializeFMUState"):
-        return False
-    with fmu.instantiate() as instance:
-        instance.initialise({})
-        saved = instance.save()
-        for refused in (lambda: instance.serialise(saved), lambda: instance.deserialise(b"0123456789abcdef", at=0.0)):
-            with pytest.raises(FmuError, match="serialise") as failed:
-                refused()
-            assert failed.value.status == Status.ERROR
-        instance.free_state(saved)
-        instance.step(0.0, 0.1)
-    return True
-
-
-@each_setting
-def test_serialised_state_moves_to_another_instance(wishbone, setting):
-    if refuses_to_serialise(wishbone):
-        return
-    names = everything(wishbone)
-    with wishbone.instantiate() as instance:
-        instance.initialise(SETTINGS[setting])
-        march(instance, grid(0.0, 0.5, 0.05), names)
-        saved = instance.save()
-        data = instance.serialise(saved)
-        assert data == instance.serialise(saved)
-        instance.free_state(saved)
-        first = march(instance, grid(0.5, 1.0, 0.05), names)
-    with wishbone.instantiate() as other:
-        other.initialise({})
-        state = other.deserialise(data, at=0.5)
-        other.restore(state)
-        other.free_state(state)
-        assert same(first, march(other, grid(0.5, 1.0, 0.05), names))
-
-
-def test_serialised_state_moves_to_another_process(wishbone, tmp_path):
-    if refuses_to_serialise(wishbone):
-        return
-    names, values = [THETA, "A.F.x", "energy.supplied"], SETTINGS["dopri5"]
-    with wishbone.instantiate() as instance:
-        instance.initialise(values)
-        march(instance, grid(0.0, 0.5, 0.05), names)
-        saved = instance.save()
-        (tmp_path / "state").write_bytes(instance.serialise(saved))
-        instance.free_state(saved)
-        expected = march(instance, grid(0.5, 1.0, 0.05), names)
-    program = f"""
-import sys
-from pathlib import Path
-from koppel import Fmu
-from koppel.fmu import grid
-with Fmu({str(wishbone.path)!r}) as fmu, fmu.instantiate() as instance:
-    instance.initialise({{}})
-    state = instance.deserialise(Path({str(tmp_path / "state")!r}).read_bytes(), at=0.5)
-    instance.restore(state)
-    instance.free_state(state)
-    values = instance.run(grid(0.5, 1.0, 0.05), {names!r}).values[1:]
-sys.stdout.write(values.tobytes().hex())
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={"PYTHONPATH": ":".join(sys.path)},
-    )
-    assert done.returncode == 0, done.stderr
-    assert bytes.fromhex(done.stdout) == expected.tobytes()
-
-
-@pytest.mark.parametrize("damage", ["shorter", "longer", "empty", "first byte", "middle byte", "last byte"])
-def test_damaged_serialised_state_is_refused(wishbone, damage):
-    if refuses_to_serialise(wishbone):
-        return
-    with wishbone.instantiate() as instance:
-        instance.initialise({})
-        instance.step(0.0, 0.1)
-        saved = instance.save()
-        data = bytearray(instance.serialise(saved))
-        instance.free_state(saved)
-        before = instance.get_all(everything(wishbone))
-        if damage == "shorter":
-            data = data[:-1]
-        elif damage == "longer":
-            data += b"\0"
-        elif damage == "empty":
-            data = bytearray()
-        else:
-            data[{"first byte": 0, "middle byte": len(data) // 2, "last byte": -1}[damage]] ^= 0x10
-        with pytest.raises(FmuError) as refused:
-            instance.deserialise(bytes(data), at=0.1)
-        assert refused.value.status == Status.ERROR
-        assert refused.value.messages, "no message"
-        assert instance.get_all(everything(wishbone)) == before
-        instance.step(0.1, 0.1)
 
 
 # The declared communication step is 0.05 s; x 0.25 to x 16. Limit of RK4 with 1e-3 s: 2e-10 / 2^4 rad, and as much again

@@ -11,10 +11,12 @@ are allocated once; numpy looks at the same memory, so no list is built in the l
 import shutil
 import statistics
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from ctypes import byref, c_size_t, c_uint8
 from dataclasses import dataclass, field
 from enum import IntEnum
+from functools import cached_property
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -91,6 +93,18 @@ class Result:
 
     def __contains__(self, name: str) -> bool:
         return name in self.names
+
+
+@dataclass(frozen=True)
+class Update:
+    """What updateDiscreteStates answered."""
+
+    again: bool
+    terminate: bool
+    #: Values of continuous states have changed.
+    moved: bool
+    #: Time of the next time event, infinity if there is none.
+    next_event: float
 
 
 @dataclass(frozen=True)
@@ -175,6 +189,24 @@ class Fmu:
             hint = f"; known there: {', '.join(close[:12])}" if close else ""
             raise KeyError(f"{self.name} has no variable {name!r}{hint}")
         return self.variables[name]
+
+    @cached_property
+    def _dependencies(self) -> dict[str, frozenset[str] | None]:
+        return {
+            unknown.variable.name: None
+            if unknown.dependencies is None
+            else frozenset(known.name for known in unknown.dependencies)
+            for unknown in self.description.outputs
+        }
+
+    def dependencies(self, output: str) -> frozenset[str] | None:
+        """Inputs and states that an output is declared to depend on; None: on any of them."""
+        return self._dependencies.get(output)
+
+    def item(self, name: str, value: Value) -> str:
+        """Name of the item that an enumeration variable has at this value (its number or name)."""
+        numbers = {int(item.value): item.name for item in self.variable(name).declaredType.items}
+        return value if isinstance(value, str) and value in numbers.values() else numbers[int(value)]
 
     def names(self, causality: str) -> list[str]:
         """Names of all Float64 variables with this causality."""
@@ -263,38 +295,50 @@ class Fmu:
         return LoopTime(min(per_run), statistics.median(per_run), runs, len(t) - 1)
 
 
-class Block:
-    """Prepared Get and Set of variables of one type; `values` is the buffer itself, seen by numpy."""
+def _nothing():
+    """Get and Set of no variables."""
 
-    def __init__(self, instance: "Instance", names: Sequence[str], type_name: str = "Float64"):
+
+class Block:
+    """Prepared Get and Set of variables of one type; `values` is the buffer itself, seen by numpy.
+
+    `memory`: a contiguous array to be used as buffer, of the type's size.
+    """
+
+    def __init__(
+        self,
+        instance: "Instance",
+        names: Sequence[str],
+        type_name: str = "Float64",
+        memory: np.ndarray | None = None,
+    ):
         self.names = list(names)
         n = len(self.names)
         for name in self.names:
             if instance.fmu.variable(name).type != type_name:
                 raise TypeError(f"{name} is {instance.fmu.variable(name).type}, not {type_name}")
         suffix, ctype = TYPES[type_name]
-        self._get, self._set = f"fmi3Get{suffix}", f"fmi3Set{suffix}"
-        self._instance = instance
-        self._references = (fmi3.fmi3ValueReference * n)(
-            *[instance.fmu.variable(name).valueReference for name in self.names]
-        )
-        self._buffer = (ctype * n)()
-        self.values = np.ctypeslib.as_array(self._buffer) if n else np.empty(0)
+        references = (fmi3.fmi3ValueReference * n)(*[instance.fmu.variable(name).valueReference for name in self.names])
+        if memory is None:
+            buffer = (ctype * n)()
+            self.values = np.ctypeslib.as_array(buffer) if n else np.empty(0)
+        else:
+            buffer, self.values = (ctype * n).from_buffer(memory), memory
+        arguments = (references, n, buffer, n)
+        #: Get and Set of what is in the buffer; nothing is called for an empty block.
+        self.get = instance.prepared(f"fmi3Get{suffix}", *arguments) if n else _nothing
+        self.set = instance.prepared(f"fmi3Set{suffix}", *arguments) if n else _nothing
 
     def read(self) -> np.ndarray:
         """Get; returns the buffer (a view, overwritten by the next read)."""
-        n = len(self.names)
-        if n:
-            self._instance.check(self._get, self._references, n, self._buffer, n)
+        self.get()
         return self.values
 
     def write(self, values: Sequence[float] | None = None):
         """Set the given values, or what is in the buffer."""
-        n = len(self.names)
         if values is not None:
             self.values[:] = values
-        if n:
-            self._instance.check(self._set, self._references, n, self._buffer, n)
+        self.set()
 
 
 class Instance:
@@ -310,6 +354,8 @@ class Instance:
         self.event_mode = event_mode
         self.messages: list[Message] = []
         self.time: float | None = None
+        #: Calls of each C function so far.
+        self.counts: Counter[str] = Counter()
         self._slave = self._open(
             guid=fmu.description.instantiationToken, unzipDirectory=str(fmu.folder), instanceName=name
         )
@@ -323,6 +369,7 @@ class Instance:
         # results of doStep and updateDiscreteStates
         self._flags = [fmi3.fmi3Boolean() for _ in range(5)]
         self._last_time = fmi3.fmi3Float64()
+        self._step_flags = [*(byref(flag) for flag in self._flags[:3]), byref(self._last_time)]
 
     def _open(self, **options):
         """The library."""
@@ -351,21 +398,39 @@ class Instance:
     def call(self, function: str, *arguments) -> Outcome:
         """The C function itself (the instance is added as first argument)."""
         before = len(self.messages)
+        self.counts[function] += 1
         status = getattr(self._slave.dll, function)(self._component, *arguments)
         return Outcome(Status(status), self.messages[before:])
 
     def check(self, function: str, *arguments) -> Status:
         """As `call`, but Discard, Error and Fatal raise."""
-        before = len(self.messages)
-        status = getattr(self._slave.dll, function)(self._component, *arguments)
-        if status > Status.WARNING:
-            raise FmuError(self.fmu.name, function, Status(status), self.messages[before:], self.time)
-        return Status(status)
+        outcome = self.call(function, *arguments)
+        if outcome.status > Status.WARNING:
+            raise FmuError(self.fmu.name, function, outcome.status, outcome.messages, self.time)
+        return outcome.status
+
+    def prepared(self, function: str, *arguments) -> Callable[[], None]:
+        """`check` with these arguments as a function of none, for calls in a loop."""
+        native, component, counts, messages = (
+            getattr(self._slave.dll, function),
+            self._component,
+            self.counts,
+            self.messages,
+        )
+
+        def call():
+            before = len(messages)
+            counts[function] += 1
+            status = native(component, *arguments)
+            if status > 1:
+                raise FmuError(self.fmu.name, function, Status(status), messages[before:], self.time)
+
+        return call
 
     # values -------------------------------------------------------------------------------------------------------
-    def block(self, names: Sequence[str], type_name: str = "Float64") -> Block:
-        """Prepared access to variables of one type."""
-        return Block(self, names, type_name)
+    def block(self, names: Sequence[str], type_name: str = "Float64", memory: np.ndarray | None = None) -> Block:
+        """Prepared access to variables of one type, in `memory` if it is given."""
+        return Block(self, names, type_name, memory)
 
     def try_set(self, name: str, value: Value) -> Outcome:
         """Set one variable; returns status and messages."""
@@ -421,12 +486,17 @@ class Instance:
         self.update_discrete_states()
         self.check("fmi3EnterStepMode")
 
+    def update_once(self) -> Update:
+        """One updateDiscreteStates."""
+        again, terminate, _nominals, moved, defined = self._flags
+        self.check("fmi3UpdateDiscreteStates", *[byref(flag) for flag in self._flags], byref(self._last_time))
+        next_event = self._last_time.value if defined.value else np.inf
+        return Update(again.value, terminate.value, moved.value, next_event)
+
     def update_discrete_states(self):
         """updateDiscreteStates until the FMU asks for no more."""
-        again = self._flags[0]
         for _ in range(100):
-            self.check("fmi3UpdateDiscreteStates", *[byref(flag) for flag in self._flags], byref(self._last_time))
-            if not again.value:
+            if not self.update_once().again:
                 return
         raise RuntimeError(f"{self.fmu.name}: the event iteration does not end")
 
@@ -439,6 +509,11 @@ class Instance:
         return outcome
 
     @property
+    def event_needed(self) -> bool:
+        """eventHandlingNeeded of the last doStep."""
+        return self._flags[0].value
+
+    @property
     def last_successful_time(self) -> float:
         """lastSuccessfulTime of the last doStep."""
         return self._last_time.value
@@ -446,8 +521,7 @@ class Instance:
     def step(self, t: float, H: float, final: bool = True):
         """doStep; raises from Discard upwards. `final`: no state from before `t` will be restored."""
         self.time = t
-        flags = [byref(flag) for flag in self._flags[:3]]
-        self.check("fmi3DoStep", t, H, final, *flags, byref(self._last_time))
+        self.check("fmi3DoStep", t, H, final, *self._step_flags)
         self.time = t + H
 
     def reset(self):
@@ -541,7 +615,8 @@ class Instance:
 
 
 class Equations(Instance):
-    """A Model Exchange instance: `x` and `x_dot` are the buffers of its continuous states and their derivatives."""
+    """A Model Exchange instance: `x`, `x_dot` and `z` are the buffers of its continuous states, their
+    derivatives and the event indicators."""
 
     INTERFACE = "ModelExchange"
 
@@ -549,11 +624,23 @@ class Equations(Instance):
         if fmu.description.modelExchange is None:
             raise ValueError(f"{fmu.path.name} has no Model Exchange interface")
         super().__init__(fmu, True, logging, name)
+        self.nx, self.nz = self._number("ContinuousStates"), self._number("EventIndicators")
+        x, x_dot = (fmi3.fmi3Float64 * self.nx)(), (fmi3.fmi3Float64 * self.nx)()
+        z = (fmi3.fmi3Float64 * self.nz)()
+        self.x, self.x_dot, self.z = (
+            np.ctypeslib.as_array(array) if len(array) else np.empty(0) for array in (x, x_dot, z)
+        )
+        self._t = fmi3.fmi3Float64()
+        self._write_time = self.prepared("fmi3SetTime", self._t)
+        self._read_states = self.prepared("fmi3GetContinuousStates", x, self.nx)
+        self._write_states = self.prepared("fmi3SetContinuousStates", x, self.nx)
+        self._read_derivatives = self.prepared("fmi3GetContinuousStateDerivatives", x_dot, self.nx)
+        self._read_indicators = self.prepared("fmi3GetEventIndicators", z, self.nz)
+
+    def _number(self, of: str) -> int:
         count = c_size_t()
-        self.check("fmi3GetNumberOfContinuousStates", byref(count))
-        self.nx = count.value
-        self._x, self._x_dot = (fmi3.fmi3Float64 * self.nx)(), (fmi3.fmi3Float64 * self.nx)()
-        self.x, self.x_dot = np.ctypeslib.as_array(self._x), np.ctypeslib.as_array(self._x_dot)
+        self.check(f"fmi3GetNumberOf{of}", byref(count))
+        return count.value
 
     def _open(self, **options):
         return fmi3.FMU3Model(modelIdentifier=self.fmu.description.modelExchange.modelIdentifier, **options)
@@ -569,22 +656,46 @@ class Equations(Instance):
     def enter_continuous_time_mode(self):
         """Event Mode -> Continuous-Time Mode; `x` is read."""
         self.update_discrete_states()
+        self.go_on()
+
+    def go_on(self):
+        """Event Mode, with all updates done, -> Continuous-Time Mode; `x` is read."""
         self.check("fmi3EnterContinuousTimeMode")
-        self.check("fmi3GetContinuousStates", self._x, self.nx)
+        self.read_states()
+
+    def read_states(self):
+        """Get the states into `x`."""
+        if self.nx:
+            self._read_states()
+
+    def nominals(self) -> np.ndarray:
+        """Nominal values of the states."""
+        nominals = (fmi3.fmi3Float64 * self.nx)()
+        if self.nx:
+            self.check("fmi3GetNominalsOfContinuousStates", nominals, self.nx)
+        return np.array(nominals)
 
     def set_time(self, t: float):
         """SetTime."""
-        self.time = t
-        self.check("fmi3SetTime", fmi3.fmi3Float64(t))
+        self.time = self._t.value = t
+        self._write_time()
 
     def write_states(self):
         """Set the states in `x`."""
-        self.check("fmi3SetContinuousStates", self._x, self.nx)
+        if self.nx:
+            self._write_states()
 
     def read_derivatives(self) -> np.ndarray:
         """Get the derivatives; returns `x_dot`."""
-        self.check("fmi3GetContinuousStateDerivatives", self._x_dot, self.nx)
+        if self.nx:
+            self._read_derivatives()
         return self.x_dot
+
+    def read_indicators(self) -> np.ndarray:
+        """Get the event indicators; returns `z`."""
+        if self.nz:
+            self._read_indicators()
+        return self.z
 
     def completed_step(self, final: bool = True) -> bool:
         """completedIntegratorStep; true if the FMU asks for Event Mode."""

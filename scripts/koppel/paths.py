@@ -8,9 +8,9 @@ OUT = ROOT / "out"
 REFERENCE = ROOT / "tests" / "reference"
 
 
-def fmu(name: str) -> Path:
-    """The packed FMI 3.0 archive of `name`; it must have been built."""
-    path = DIST / "fmi3" / f"{name}.fmu"
+def fmu(name: str, fmi: int = 3) -> Path:
+    """The packed archive of `name` for this version of FMI; it must have been built."""
+    path = DIST / f"fmi{fmi}" / f"{name}.fmu"
     if not path.is_file():
         raise FileNotFoundError(f"{path.relative_to(ROOT)} is missing: run scripts/build {name}")
     return path

@@ -4,7 +4,7 @@ use model::{Causality, Model};
 use num_dual::Dual64;
 
 use crate::jobs::{Evaluate, Rates};
-use crate::phase::{Interface, Phase};
+use crate::phase::Phase;
 use crate::state::State;
 use crate::table::{ALL_PARTS, Layout, Part, Variable};
 use crate::values::same_length;
@@ -70,8 +70,8 @@ impl<M: Model> Instance<M> {
 
     fn check_knowns(&self, knowns: &[u32], seed: &[f64]) -> Result<(), Fault> {
         let State { interface, phase, .. } = self.state;
-        let states = phase == Phase::EventMode
-            || interface == Interface::ModelExchange && phase != Phase::InitializationMode;
+        let states =
+            phase == Phase::EventMode || interface.is_model_exchange() && phase != Phase::InitializationMode;
         for known in knowns {
             let v = self.variable(*known)?;
             let state = self.table.is_state(*known as usize);

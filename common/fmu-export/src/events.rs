@@ -3,7 +3,7 @@
 use model::Model;
 
 use crate::jobs::{Update, Updated};
-use crate::phase::{Interface, Phase};
+use crate::phase::Phase;
 use crate::state::State;
 use crate::table::{Layout, Part};
 use crate::{Fault, Instance};
@@ -28,7 +28,7 @@ impl<M: Model> Instance<M> {
     /// # Errors
     /// In Model Exchange, where the event indicators have no value.
     pub fn enter_event_mode(&mut self) -> Result<(), Fault> {
-        if self.state.interface == Interface::ModelExchange && !M::INDICATORS.is_empty() {
+        if self.state.interface.is_model_exchange() && !M::INDICATORS.is_empty() {
             self.refresh(Part::Indicators.bit())?;
             let State { sides, values, .. } = &self.state;
             let mut now = sides.iter().zip(&values[Layout::<M>::part(Part::Indicators)]);

@@ -3,9 +3,9 @@
 use integrators::{SettingsError, StepError};
 use model::{EvaluationError, ParameterError};
 
-use crate::{Interface, SolverMethod};
+use crate::{Interface, SerialisedStateError, SolverMethod};
 
-/// Status of a call, numbered as `fmi3Status`.
+/// Status of a call, numbered as `fmi2Status` and `fmi3Status`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C)]
 pub enum Status {
@@ -63,6 +63,24 @@ pub enum Fault {
         phase: String,
         /// Why
         reason: &'static str,
+    },
+    /// Number that does not fit into the type of the call.
+    #[error("{variable} = {value} does not fit into {called}")]
+    TooLarge {
+        /// Variable
+        variable: String,
+        /// Its value
+        value: f64,
+        /// Type of the call
+        called: &'static str,
+    },
+    /// Nothing is known about the last step under this kind of `fmi2StatusKind`.
+    #[error(
+        "status kind {kind} has no answer here: steps are done when fmi2DoStep returns; answered: fmi2GetRealStatus of fmi2LastSuccessfulTime (2), fmi2GetBooleanStatus of fmi2Terminated (3)"
+    )]
+    NoStatus {
+        /// The kind
+        kind: u32,
     },
     /// Null where data is needed.
     #[error("{argument} is null")]
@@ -134,6 +152,9 @@ pub enum Fault {
         /// How this one is used
         instance: Interface,
     },
+    /// Bytes that are no state of this FMU.
+    #[error("serialised state is refused: {0}")]
+    Serialised(#[from] SerialisedStateError),
     /// Parameters that do not fit together.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
@@ -207,6 +228,8 @@ impl Fault {
     pub fn status(&self) -> Status {
         match self {
             Self::Value { .. }
+            | Self::TooLarge { .. }
+            | Self::NoStatus { .. }
             | Self::Step { .. }
             | Self::Unstable { .. }
             | Self::Evaluation { .. }

@@ -1,11 +1,12 @@
 //! An instance of an FMU without its C boundary: life cycle and lazy outputs.
 
 use integrators::{Solver, Statistics};
-use model::{Model, ParameterError, Variability, Variables};
+use model::{Kind, Model, ParameterError, Variability, Variables};
 use num_dual::Dual64;
 
+use crate::built::Built;
 use crate::inputs::{Channels, Polynomials};
-use crate::jobs::{Evaluate, EventIndicators, Rates, Start};
+use crate::jobs::{Begin, Evaluate, EventIndicators, Rates, Start};
 use crate::phase::{Interface, Phase, Rule};
 use crate::state::State;
 use crate::table::{ALL_PARTS, Layout, Part, Table, Variable};
@@ -106,11 +107,17 @@ impl<M: Model> Instance<M> {
             .ok_or(Fault::UnknownReference { reference, count: self.table.variables.len() })
     }
 
-    /// Begin initialisation.
+    /// Name of a type in the standard that the instance speaks.
+    #[must_use]
+    pub fn type_name(&self, kind: Kind) -> &'static str {
+        self.state.interface.standard().type_name(kind)
+    }
+
+    /// Times of the run.
     ///
     /// # Errors
     /// Times that make no sense.
-    pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
+    pub fn setup_experiment(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
         if !start.is_finite() {
             return Err(Fault::Argument { argument: "startTime", value: start, allowed: "finite".into() });
         }
@@ -125,9 +132,26 @@ impl<M: Model> Instance<M> {
         }
         self.state.start_time = start;
         self.state.stop_time = stop;
-        self.state.values[0] = start;
+        Ok(())
+    }
+
+    /// Begin initialisation at the time that was set up, otherwise at 0.
+    ///
+    /// # Errors
+    /// None.
+    pub fn begin_initialization(&mut self) -> Result<(), Fault> {
+        self.state.values[0] = self.state.start_time;
         self.state.phase = Phase::InitializationMode;
         Ok(())
+    }
+
+    /// Begin initialisation of a run with these times.
+    ///
+    /// # Errors
+    /// As [`setup_experiment`](Self::setup_experiment).
+    pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
+        self.setup_experiment(start, stop)?;
+        self.begin_initialization()
     }
 
     /// Build the model and its consistent start, if values have changed since.
@@ -135,13 +159,9 @@ impl<M: Model> Instance<M> {
         if self.state.model.is_some() {
             return Ok(());
         }
-        let values = &self.state.values;
         let given = &self.state.motion_start;
-        let parameters = M::Parameters::load(&values[Layout::<M>::PARAMETERS]);
-        let mut model = M::new(&parameters, &M::Motion::load(given))?;
-        if self.state.interface == Interface::ModelExchange {
-            model.for_model_exchange();
-        }
+        let exchange = self.state.interface.is_model_exchange();
+        let model = Built::<M>::new(&self.state.values[Layout::<M>::PARAMETERS], given, exchange)?;
         let (x, discrete, names) = model.with_system(Start { t: self.state.start_time, given })?;
         if M::MODEL_EXCHANGE {
             let place = |name: String| {
@@ -164,7 +184,7 @@ impl<M: Model> Instance<M> {
     /// # Errors
     /// [`Fault::Parameter`], [`Fault::MethodNotOffered`], start states without accelerations.
     pub fn exit_initialization(&mut self) -> Result<(), Fault> {
-        let solver = if self.state.interface == Interface::ModelExchange {
+        let solver = if self.state.interface.is_model_exchange() {
             None
         } else {
             let solver = SolverParameters::load(&self.state.values[Layout::<M>::SOLVER]);
@@ -197,10 +217,7 @@ impl<M: Model> Instance<M> {
         if self.state.retune
             && let Some(model) = &mut self.state.model
         {
-            model.retune(&M::Parameters::load(&self.state.values[Layout::<M>::PARAMETERS]));
-            if self.state.interface == Interface::ModelExchange {
-                model.for_model_exchange();
-            }
+            model.retune(&self.state.values[Layout::<M>::PARAMETERS]);
             self.state.retune = false;
             self.state.guarded = 0.0;
             self.state.fresh = 0;
@@ -219,9 +236,12 @@ impl<M: Model> Instance<M> {
 
     fn compute(&mut self, needed: u8) -> Result<(), Fault> {
         self.tuned()?;
-        let State { values, model, x, places, discrete: d, fresh, .. } = &mut self.state;
+        let State { phase, values, model, x, places, discrete: d, fresh, .. } = &mut self.state;
         let Some(model) = model else { return Ok(()) };
         let t = values[0];
+        if *phase == Phase::InitializationMode {
+            *d = model.with_system(Begin { x, u: &values[Layout::<M>::INPUTS], d });
+        }
         for part in Part::ALL {
             if needed & !*fresh & part.bit() == 0 {
                 continue;

@@ -37,6 +37,21 @@ impl<M: Model> Visitor<M> for Start<'_> {
     }
 }
 
+/// Discrete states at the end of initialisation.
+pub(crate) struct Begin<'a, M: Model> {
+    pub(crate) x: &'a [f64],
+    pub(crate) u: &'a [f64],
+    pub(crate) d: &'a M::Discrete,
+}
+
+impl<M: Model> Visitor<M> for Begin<'_, M> {
+    type Output = M::Discrete;
+    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) -> M::Discrete {
+        let x: [f64; N] = std::array::from_fn(|i| self.x[i]);
+        system.begin(&x, &M::Inputs::<f64>::load(self.u), self.d)
+    }
+}
+
 /// Values of one group of outputs; in dual numbers their directional derivatives.
 pub(crate) struct Evaluate<'a, M: Model, S> {
     pub(crate) group: Group,
@@ -112,6 +127,16 @@ impl<M: Model> Visitor<M> for Nominals<'_> {
                 self.values[*place] = nominal;
             }
         }
+    }
+}
+
+/// Number of states.
+pub(crate) struct Size;
+
+impl<M: Model> Visitor<M> for Size {
+    type Output = usize;
+    fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, _system: &Y) -> usize {
+        N
     }
 }
 

@@ -1,13 +1,14 @@
 //! Exports a [`model::Model`] as an FMU.
 //!
 //! ```text
-//! model (safe trait)  ->  instance (values, phases, lazy outputs, steps)  ->  c_abi (FMI 3.0)
+//! model (safe trait)  ->  instance (values, phases, lazy outputs, steps)  ->  c_abi (FMI 2.0, 3.0)
 //!                     ->  describe (modelDescription.xml)                 ->  package (.fmu)
 //! ```
 //!
 //! An FMU crate is `fmu_export::export!(Model);` in its library and `fmu_export::run::<Model>()` in
 //! its program, which describes and packs it.
 
+mod built;
 pub mod c_abi;
 mod derivatives;
 mod describe;
@@ -19,7 +20,9 @@ mod instance;
 mod jobs;
 mod package;
 mod phase;
+mod serialise;
 mod solver;
+mod standard;
 mod state;
 mod step;
 mod table;
@@ -33,6 +36,8 @@ pub use inputs::{InputTreatment, PortParameters, PortReset};
 pub use instance::Instance;
 pub use package::{PackError, archive, run};
 pub use phase::{Interface, Phase, Rule};
+pub use serialise::SerialisedStateError;
 pub use solver::{SolverCounters, SolverMethod, SolverParameters};
+pub use standard::Standard;
 pub use state::State;
 pub use table::{Table, Variable};

@@ -9,6 +9,7 @@ use model::Model;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
+use crate::Standard;
 use crate::describe::model_description;
 
 /// Everything that can go wrong while packing.
@@ -29,29 +30,32 @@ pub enum PackError {
     #[error("archive: {0}")]
     Archive(#[from] zip::result::ZipError),
     /// The command line is not understood.
-    #[error("usage: {0} describe | {0} pack --library FILE --output FILE")]
+    #[error("usage: {0} describe --fmi 2|3 | {0} pack --fmi 2|3 --library FILE --output FILE")]
     Usage(&'static str),
 }
 
-/// Folder of the binaries of this platform inside an FMI 3.0 archive.
-const PLATFORM: &str = match (cfg!(target_os = "windows"), cfg!(target_os = "macos")) {
-    (true, _) => "x86_64-windows",
-    (_, true) => "x86_64-darwin",
-    _ => "x86_64-linux",
-};
-
-/// The archive with the shared library `library` inside.
-///
-/// # Errors
-/// [`PackError`].
-pub fn archive<M: Model>(library: &[u8], extension: &str) -> Result<Vec<u8>, PackError> {
-    let mut files = [
-        (format!("binaries/{PLATFORM}/{}.{extension}", M::NAME), library.to_vec()),
+/// Everything inside the archive: path and content, in any order.
+fn contents<M: Model>(
+    standard: Standard,
+    library: &[u8],
+    extension: &str,
+) -> Result<Vec<(String, Vec<u8>)>, PackError> {
+    let binary = format!("binaries/{}/{}.{extension}", standard.platform(), M::NAME);
+    Ok(vec![
+        (binary, library.to_vec()),
         ("documentation/licenses/license.spdx".into(), b"MIT OR Apache-2.0\n".to_vec()),
         ("documentation/licenses/LICENSE-APACHE".into(), include_bytes!("../../../LICENSE-APACHE").to_vec()),
         ("documentation/licenses/LICENSE-MIT".into(), include_bytes!("../../../LICENSE-MIT").to_vec()),
-        ("modelDescription.xml".into(), model_description::<M>()?),
-    ];
+        ("modelDescription.xml".into(), model_description::<M>(standard)?),
+    ])
+}
+
+/// The archive for one version of FMI with the shared library `library` inside.
+///
+/// # Errors
+/// [`PackError`].
+pub fn archive<M: Model>(standard: Standard, library: &[u8], extension: &str) -> Result<Vec<u8>, PackError> {
+    let mut files = contents::<M>(standard, library, extension)?;
     files.sort(); // the same order wherever it is built
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
@@ -71,11 +75,16 @@ fn file<T>(path: &str, result: io::Result<T>) -> Result<T, PackError> {
 
 fn command<M: Model>(arguments: &[String]) -> Result<(), PackError> {
     let arguments: Vec<_> = arguments.iter().map(String::as_str).collect();
-    match arguments[..] {
-        ["describe"] => Ok(io::stdout().lock().write_all(&model_description::<M>()?)?),
-        ["pack", "--library", library, "--output", output] => {
+    let standard = match arguments[..] {
+        [_, "--fmi", "2", ..] => Standard::Fmi2,
+        [_, "--fmi", "3", ..] => Standard::Fmi3,
+        _ => return Err(PackError::Usage(M::NAME)),
+    };
+    match (arguments[0], &arguments[3..]) {
+        ("describe", []) => Ok(io::stdout().lock().write_all(&model_description::<M>(standard)?)?),
+        ("pack", ["--library", library, "--output", output]) => {
             let extension = Path::new(library).extension().and_then(|e| e.to_str()).unwrap_or("so");
-            let archive = archive::<M>(&file(library, fs::read(library))?, extension)?;
+            let archive = archive::<M>(standard, &file(library, fs::read(library))?, extension)?;
             if let Some(folder) = Path::new(output).parent() {
                 file(output, fs::create_dir_all(folder))?;
             }

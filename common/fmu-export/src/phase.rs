@@ -1,36 +1,62 @@
-//! The state machines of FMI 3.0 as one table: which function may be called when, and where.
+//! The state machines of FMI 3.0 and 2.0 as one table: which function may be called when, and where.
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
+use crate::Standard;
+
 /// How an instance is used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Interface {
-    /// Co-Simulation with eventModeUsed = false
+    /// FMI 3.0 Co-Simulation with eventModeUsed = false
     CoSimulation = 1,
-    /// Co-Simulation with eventModeUsed = true
+    /// FMI 3.0 Co-Simulation with eventModeUsed = true
     CoSimulationWithEvents = 2,
-    /// Model Exchange
+    /// FMI 3.0 Model Exchange
     ModelExchange = 4,
+    /// FMI 2.0 Co-Simulation
+    CoSimulation2 = 8,
+    /// FMI 2.0 Model Exchange
+    ModelExchange2 = 16,
 }
 
+use Interface::{CoSimulation, CoSimulation2, CoSimulationWithEvents, ModelExchange, ModelExchange2};
+
 impl Interface {
-    const ALL: [Self; 3] = [Self::CoSimulation, Self::CoSimulationWithEvents, Self::ModelExchange];
+    const ALL: [Self; 5] =
+        [CoSimulation, CoSimulationWithEvents, ModelExchange, CoSimulation2, ModelExchange2];
+
+    /// The version of FMI that the instance speaks.
+    #[must_use]
+    pub const fn standard(self) -> Standard {
+        match self {
+            CoSimulation | CoSimulationWithEvents | ModelExchange => Standard::Fmi3,
+            CoSimulation2 | ModelExchange2 => Standard::Fmi2,
+        }
+    }
+
+    /// A host integrates the states.
+    #[must_use]
+    pub const fn is_model_exchange(self) -> bool {
+        matches!(self, ModelExchange | ModelExchange2)
+    }
 
     /// Where an instance stands after initialisation.
     pub(crate) const fn after_initialization(self) -> Phase {
         match self {
-            Self::CoSimulation => StepMode,
-            Self::CoSimulationWithEvents | Self::ModelExchange => EventMode,
+            CoSimulation | CoSimulation2 => StepMode,
+            CoSimulationWithEvents | ModelExchange | ModelExchange2 => EventMode,
         }
     }
 
     /// The phases that exist.
     const fn phases(self) -> u8 {
         match self {
-            Self::CoSimulation => ANY & !(EventMode as u8 | ContinuousTimeMode as u8),
-            Self::CoSimulationWithEvents => ANY & !(ContinuousTimeMode as u8),
-            Self::ModelExchange => ANY & !(StepMode as u8),
+            CoSimulation | CoSimulation2 => ANY & !(EventMode as u8 | ContinuousTimeMode as u8),
+            CoSimulationWithEvents => ANY & !(ContinuousTimeMode as u8),
+            ModelExchange | ModelExchange2 => ANY & !(StepMode as u8),
         }
     }
 }
@@ -38,24 +64,26 @@ impl Interface {
 impl fmt::Display for Interface {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::CoSimulation => "Co-Simulation with eventModeUsed = false",
-            Self::CoSimulationWithEvents => "Co-Simulation with eventModeUsed = true",
-            Self::ModelExchange => "Model Exchange",
+            CoSimulation => "Co-Simulation with eventModeUsed = false",
+            CoSimulationWithEvents => "Co-Simulation with eventModeUsed = true",
+            ModelExchange => "Model Exchange",
+            CoSimulation2 => "FMI 2.0 Co-Simulation",
+            ModelExchange2 => "FMI 2.0 Model Exchange",
         })
     }
 }
 
 /// Where an instance stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Phase {
     /// Created or reset
     Instantiated = 1,
     /// Between Enter- and `ExitInitializationMode`
     InitializationMode = 2,
-    /// Ready for `DoStep` (Co-Simulation)
+    /// Ready for `DoStep` (Co-Simulation; FMI 2.0: stepComplete)
     StepMode = 4,
-    /// Ready for `UpdateDiscreteStates`
+    /// Ready for `UpdateDiscreteStates` (FMI 2.0: `NewDiscreteStates`)
     EventMode = 8,
     /// Under a foreign integrator (Model Exchange)
     ContinuousTimeMode = 16,
@@ -76,11 +104,6 @@ const ANY: u8 = SETTABLE | Terminated as u8;
 const RUNNING: u8 = ANY & !(Instantiated as u8);
 const TERMINABLE: u8 = StepMode as u8 | EventMode as u8 | ContinuousTimeMode as u8;
 
-const CS: u8 = Interface::CoSimulation as u8 | CS_EVENTS;
-const CS_EVENTS: u8 = Interface::CoSimulationWithEvents as u8;
-const ME: u8 = Interface::ModelExchange as u8;
-const ALL_INTERFACES: u8 = CS | ME;
-
 /// When a function may be called.
 #[derive(Debug, Clone, Copy)]
 pub struct Rule {
@@ -90,59 +113,124 @@ pub struct Rule {
     phases: u8,
 }
 
-/// A row of the table.
+/// The rows of one standard.
 macro_rules! rules {
     ($($name:ident $function:literal $interfaces:ident $phases:expr;)*) => {
         $(
             #[doc = concat!("Rule of `", $function, "`.")]
             pub(crate) const $name: Rule = Rule { function: $function, interfaces: $interfaces, phases: $phases };
         )*
-        /// The table.
+        /// All of them.
         #[cfg(test)]
-        const ALL: &[Rule] = &[$($name),*];
+        pub(super) const ALL: &[Rule] = &[$($name),*];
     };
 }
 
-rules! {
-    SET_DEBUG_LOGGING "fmi3SetDebugLogging" ALL_INTERFACES ANY;
-    ENTER_INITIALIZATION "fmi3EnterInitializationMode" ALL_INTERFACES Instantiated as u8;
-    EXIT_INITIALIZATION "fmi3ExitInitializationMode" ALL_INTERFACES InitializationMode as u8;
-    ENTER_EVENT_MODE "fmi3EnterEventMode" EVENTFUL StepMode as u8 | ContinuousTimeMode as u8;
-    UPDATE_DISCRETE_STATES "fmi3UpdateDiscreteStates" EVENTFUL EventMode as u8;
-    ENTER_STEP_MODE "fmi3EnterStepMode" CS_EVENTS EventMode as u8;
-    DO_STEP "fmi3DoStep" CS StepMode as u8;
-    TERMINATE "fmi3Terminate" ALL_INTERFACES TERMINABLE;
-    RESET "fmi3Reset" ALL_INTERFACES ANY;
-    GET_FLOAT64 "fmi3GetFloat64" ALL_INTERFACES RUNNING;
-    GET_INT32 "fmi3GetInt32" ALL_INTERFACES RUNNING;
-    GET_INT64 "fmi3GetInt64" ALL_INTERFACES RUNNING;
-    GET_BOOLEAN "fmi3GetBoolean" ALL_INTERFACES RUNNING;
-    GET_OTHER "fmi3Get{VariableType}" ALL_INTERFACES RUNNING;
-    SET_FLOAT64 "fmi3SetFloat64" ALL_INTERFACES SETTABLE;
-    SET_INT32 "fmi3SetInt32" ALL_INTERFACES SETTABLE;
-    SET_INT64 "fmi3SetInt64" ALL_INTERFACES SETTABLE;
-    SET_BOOLEAN "fmi3SetBoolean" ALL_INTERFACES SETTABLE;
-    SET_OTHER "fmi3Set{VariableType}" ALL_INTERFACES SETTABLE;
-    GET_FMU_STATE "fmi3GetFMUState" ALL_INTERFACES ANY;
-    SET_FMU_STATE "fmi3SetFMUState" ALL_INTERFACES ANY;
-    FREE_FMU_STATE "fmi3FreeFMUState" ALL_INTERFACES ANY;
-    DIRECTIONAL_DERIVATIVE "fmi3GetDirectionalDerivative" ALL_INTERFACES RUNNING;
-    DEPENDENCIES "fmi3GetVariableDependencies" ALL_INTERFACES ANY;
-    ENTER_CONTINUOUS_TIME_MODE "fmi3EnterContinuousTimeMode" ME EventMode as u8;
-    SET_TIME "fmi3SetTime" ME EventMode as u8 | ContinuousTimeMode as u8;
-    SET_CONTINUOUS_STATES "fmi3SetContinuousStates" ME ContinuousTimeMode as u8;
-    COMPLETED_INTEGRATOR_STEP "fmi3CompletedIntegratorStep" ME ContinuousTimeMode as u8;
-    GET_CONTINUOUS_STATES "fmi3GetContinuousStates" ME RUNNING;
-    GET_DERIVATIVES "fmi3GetContinuousStateDerivatives" ME RUNNING;
-    GET_NOMINALS "fmi3GetNominalsOfContinuousStates" ME RUNNING;
-    GET_INDICATORS "fmi3GetEventIndicators" ME RUNNING;
-    COUNT_STATES "fmi3GetNumberOfContinuousStates" ME ANY;
-    COUNT_INDICATORS "fmi3GetNumberOfEventIndicators" ME ANY;
-    UNSUPPORTED "" ALL_INTERFACES ANY;
+/// The functions of FMI 3.0.
+pub(crate) mod fmi3 {
+    use super::Phase::{ContinuousTimeMode, EventMode, InitializationMode, Instantiated, StepMode};
+    use super::{
+        ANY, CoSimulation, CoSimulationWithEvents, ModelExchange, RUNNING, Rule, SETTABLE, TERMINABLE,
+    };
+
+    const CS_EVENTS: u8 = CoSimulationWithEvents as u8;
+    const CS: u8 = CoSimulation as u8 | CS_EVENTS;
+    const ME: u8 = ModelExchange as u8;
+    const EVENTFUL: u8 = CS_EVENTS | ME;
+    const FMI3: u8 = CS | ME;
+
+    rules! {
+        SET_DEBUG_LOGGING "fmi3SetDebugLogging" FMI3 ANY;
+        ENTER_INITIALIZATION "fmi3EnterInitializationMode" FMI3 Instantiated as u8;
+        EXIT_INITIALIZATION "fmi3ExitInitializationMode" FMI3 InitializationMode as u8;
+        ENTER_EVENT_MODE "fmi3EnterEventMode" EVENTFUL StepMode as u8 | ContinuousTimeMode as u8;
+        UPDATE_DISCRETE_STATES "fmi3UpdateDiscreteStates" EVENTFUL EventMode as u8;
+        ENTER_STEP_MODE "fmi3EnterStepMode" CS_EVENTS EventMode as u8;
+        DO_STEP "fmi3DoStep" CS StepMode as u8;
+        TERMINATE "fmi3Terminate" FMI3 TERMINABLE;
+        RESET "fmi3Reset" FMI3 ANY;
+        GET_FLOAT64 "fmi3GetFloat64" FMI3 RUNNING;
+        GET_INT32 "fmi3GetInt32" FMI3 RUNNING;
+        GET_INT64 "fmi3GetInt64" FMI3 RUNNING;
+        GET_BOOLEAN "fmi3GetBoolean" FMI3 RUNNING;
+        GET_OTHER "fmi3Get{VariableType}" FMI3 RUNNING;
+        SET_FLOAT64 "fmi3SetFloat64" FMI3 SETTABLE;
+        SET_INT32 "fmi3SetInt32" FMI3 SETTABLE;
+        SET_INT64 "fmi3SetInt64" FMI3 SETTABLE;
+        SET_BOOLEAN "fmi3SetBoolean" FMI3 SETTABLE;
+        SET_OTHER "fmi3Set{VariableType}" FMI3 SETTABLE;
+        GET_FMU_STATE "fmi3GetFMUState" FMI3 ANY;
+        SET_FMU_STATE "fmi3SetFMUState" FMI3 ANY;
+        FREE_FMU_STATE "fmi3FreeFMUState" FMI3 ANY;
+        SERIALISED_SIZE "fmi3SerializedFMUStateSize" FMI3 ANY;
+        SERIALISE "fmi3SerializeFMUState" FMI3 ANY;
+        DESERIALISE "fmi3DeserializeFMUState" FMI3 ANY;
+        DIRECTIONAL_DERIVATIVE "fmi3GetDirectionalDerivative" FMI3 RUNNING;
+        DEPENDENCIES "fmi3GetVariableDependencies" FMI3 ANY;
+        ENTER_CONTINUOUS_TIME_MODE "fmi3EnterContinuousTimeMode" ME EventMode as u8;
+        SET_TIME "fmi3SetTime" ME EventMode as u8 | ContinuousTimeMode as u8;
+        SET_CONTINUOUS_STATES "fmi3SetContinuousStates" ME ContinuousTimeMode as u8;
+        COMPLETED_INTEGRATOR_STEP "fmi3CompletedIntegratorStep" ME ContinuousTimeMode as u8;
+        GET_CONTINUOUS_STATES "fmi3GetContinuousStates" ME RUNNING;
+        GET_DERIVATIVES "fmi3GetContinuousStateDerivatives" ME RUNNING;
+        GET_NOMINALS "fmi3GetNominalsOfContinuousStates" ME RUNNING;
+        GET_INDICATORS "fmi3GetEventIndicators" ME RUNNING;
+        COUNT_STATES "fmi3GetNumberOfContinuousStates" ME ANY;
+        COUNT_INDICATORS "fmi3GetNumberOfEventIndicators" ME ANY;
+        UNSUPPORTED "" FMI3 ANY;
+    }
 }
 
-/// Interfaces with Event Mode.
-const EVENTFUL: u8 = CS_EVENTS | ME;
+/// The functions of FMI 2.0.
+pub(crate) mod fmi2 {
+    use super::Phase::{ContinuousTimeMode, EventMode, InitializationMode, Instantiated, StepMode};
+    use super::{ANY, CoSimulation2, ModelExchange2, RUNNING, Rule, SETTABLE, TERMINABLE};
+
+    const CS: u8 = CoSimulation2 as u8;
+    const ME: u8 = ModelExchange2 as u8;
+    const FMI2: u8 = CS | ME;
+
+    rules! {
+        SET_DEBUG_LOGGING "fmi2SetDebugLogging" FMI2 ANY;
+        SETUP_EXPERIMENT "fmi2SetupExperiment" FMI2 Instantiated as u8;
+        ENTER_INITIALIZATION "fmi2EnterInitializationMode" FMI2 Instantiated as u8;
+        EXIT_INITIALIZATION "fmi2ExitInitializationMode" FMI2 InitializationMode as u8;
+        DO_STEP "fmi2DoStep" CS StepMode as u8;
+        TERMINATE "fmi2Terminate" FMI2 TERMINABLE;
+        RESET "fmi2Reset" FMI2 ANY;
+        GET_REAL "fmi2GetReal" FMI2 RUNNING;
+        GET_INTEGER "fmi2GetInteger" FMI2 RUNNING;
+        GET_BOOLEAN "fmi2GetBoolean" FMI2 RUNNING;
+        GET_STRING "fmi2GetString" FMI2 RUNNING;
+        SET_REAL "fmi2SetReal" FMI2 SETTABLE;
+        SET_INTEGER "fmi2SetInteger" FMI2 SETTABLE;
+        SET_BOOLEAN "fmi2SetBoolean" FMI2 SETTABLE;
+        SET_STRING "fmi2SetString" FMI2 SETTABLE;
+        GET_FMU_STATE "fmi2GetFMUstate" FMI2 ANY;
+        SET_FMU_STATE "fmi2SetFMUstate" FMI2 ANY;
+        FREE_FMU_STATE "fmi2FreeFMUstate" FMI2 ANY;
+        SERIALISED_SIZE "fmi2SerializedFMUstateSize" FMI2 ANY;
+        SERIALISE "fmi2SerializeFMUstate" FMI2 ANY;
+        DESERIALISE "fmi2DeSerializeFMUstate" FMI2 ANY;
+        DIRECTIONAL_DERIVATIVE "fmi2GetDirectionalDerivative" FMI2 RUNNING;
+        ENTER_EVENT_MODE "fmi2EnterEventMode" ME ContinuousTimeMode as u8;
+        NEW_DISCRETE_STATES "fmi2NewDiscreteStates" ME EventMode as u8;
+        ENTER_CONTINUOUS_TIME_MODE "fmi2EnterContinuousTimeMode" ME EventMode as u8;
+        COMPLETED_INTEGRATOR_STEP "fmi2CompletedIntegratorStep" ME ContinuousTimeMode as u8;
+        SET_TIME "fmi2SetTime" ME EventMode as u8 | ContinuousTimeMode as u8;
+        SET_CONTINUOUS_STATES "fmi2SetContinuousStates" ME ContinuousTimeMode as u8;
+        GET_DERIVATIVES "fmi2GetDerivatives" ME RUNNING;
+        GET_INDICATORS "fmi2GetEventIndicators" ME RUNNING;
+        GET_CONTINUOUS_STATES "fmi2GetContinuousStates" ME RUNNING;
+        GET_NOMINALS "fmi2GetNominalsOfContinuousStates" ME RUNNING;
+        GET_STATUS "fmi2GetStatus" CS RUNNING;
+        GET_REAL_STATUS "fmi2GetRealStatus" CS RUNNING;
+        GET_INTEGER_STATUS "fmi2GetIntegerStatus" CS RUNNING;
+        GET_BOOLEAN_STATUS "fmi2GetBooleanStatus" CS RUNNING;
+        GET_STRING_STATUS "fmi2GetStringStatus" CS RUNNING;
+        UNSUPPORTED "" FMI2 ANY;
+    }
+}
 
 impl Rule {
     /// True if the function may be called in `phase`.
@@ -172,32 +260,68 @@ impl Rule {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use Interface::{CoSimulation, CoSimulationWithEvents, ModelExchange};
 
-    /// The state machines of the standard (FMI 3.0, 3.2.1 and 4.2.1), one line per transition function.
+    /// The state machine of FMI 3.0 (3.2.1 and 4.2.1), one line per transition function.
     #[test]
-    fn transitions_start_where_the_standard_says() {
+    fn transitions_of_fmi3_start_where_the_standard_says() {
         let elsewhere = "Co-Simulation with eventModeUsed = true, Model Exchange";
         for (rule, plain, events, exchange) in [
-            (ENTER_INITIALIZATION, "Instantiated", "Instantiated", "Instantiated"),
-            (EXIT_INITIALIZATION, "InitializationMode", "InitializationMode", "InitializationMode"),
-            (ENTER_EVENT_MODE, elsewhere, "StepMode", "ContinuousTimeMode"),
-            (UPDATE_DISCRETE_STATES, elsewhere, "EventMode", "EventMode"),
-            (TERMINATE, "StepMode", "StepMode, EventMode", "EventMode, ContinuousTimeMode"),
-            (ENTER_CONTINUOUS_TIME_MODE, "Model Exchange", "Model Exchange", "EventMode"),
+            (fmi3::ENTER_INITIALIZATION, "Instantiated", "Instantiated", "Instantiated"),
+            (fmi3::EXIT_INITIALIZATION, "InitializationMode", "InitializationMode", "InitializationMode"),
+            (fmi3::ENTER_EVENT_MODE, elsewhere, "StepMode", "ContinuousTimeMode"),
+            (fmi3::UPDATE_DISCRETE_STATES, elsewhere, "EventMode", "EventMode"),
+            (fmi3::TERMINATE, "StepMode", "StepMode, EventMode", "EventMode, ContinuousTimeMode"),
+            (fmi3::ENTER_CONTINUOUS_TIME_MODE, "Model Exchange", "Model Exchange", "EventMode"),
         ] {
             let said = [CoSimulation, CoSimulationWithEvents, ModelExchange].map(|i| rule.allowed(i));
             assert_eq!(said, [plain, events, exchange], "{}", rule.function);
         }
-        assert_eq!(ENTER_STEP_MODE.allowed(CoSimulationWithEvents), "EventMode");
-        assert!(!ENTER_STEP_MODE.allows(ModelExchange, EventMode));
-        assert!(DO_STEP.allows(CoSimulation, StepMode) && DO_STEP.allows(CoSimulationWithEvents, StepMode));
-        assert!(!DO_STEP.allows(CoSimulationWithEvents, EventMode));
+        let (step, enter) = (fmi3::DO_STEP, fmi3::ENTER_STEP_MODE);
+        assert_eq!(enter.allowed(CoSimulationWithEvents), "EventMode");
+        assert!(!enter.allows(ModelExchange, EventMode));
+        assert!(step.allows(CoSimulation, StepMode) && step.allows(CoSimulationWithEvents, StepMode));
+        assert!(!step.allows(CoSimulationWithEvents, EventMode));
+    }
+
+    /// The state machines of FMI 2.0.4 (3.2.3 and 4.2.4), by the names that the phases have here.
+    #[test]
+    fn functions_of_fmi2_are_allowed_where_the_standard_says() {
+        let (cs, me) = ("FMI 2.0 Co-Simulation", "FMI 2.0 Model Exchange");
+        let in_a_run = "InitializationMode, EventMode, ContinuousTimeMode, Terminated";
+        for (rule, simulation, exchange) in [
+            (fmi2::SETUP_EXPERIMENT, "Instantiated", "Instantiated"),
+            (fmi2::ENTER_INITIALIZATION, "Instantiated", "Instantiated"),
+            (fmi2::EXIT_INITIALIZATION, "InitializationMode", "InitializationMode"),
+            (fmi2::TERMINATE, "StepMode", "EventMode, ContinuousTimeMode"),
+            (fmi2::DO_STEP, "StepMode", cs),
+            (fmi2::GET_REAL_STATUS, "InitializationMode, StepMode, Terminated", cs),
+            (fmi2::GET_REAL, "InitializationMode, StepMode, Terminated", in_a_run),
+            (fmi2::ENTER_EVENT_MODE, me, "ContinuousTimeMode"),
+            (fmi2::NEW_DISCRETE_STATES, me, "EventMode"),
+            (fmi2::ENTER_CONTINUOUS_TIME_MODE, me, "EventMode"),
+            (fmi2::COMPLETED_INTEGRATOR_STEP, me, "ContinuousTimeMode"),
+            (fmi2::SET_TIME, me, "EventMode, ContinuousTimeMode"),
+            (fmi2::SET_CONTINUOUS_STATES, me, "ContinuousTimeMode"),
+            (fmi2::GET_DERIVATIVES, me, in_a_run),
+        ] {
+            let said = [CoSimulation2, ModelExchange2].map(|i| rule.allowed(i));
+            assert_eq!(said, [simulation, exchange], "{}", rule.function);
+        }
+    }
+
+    #[test]
+    fn an_instance_speaks_one_standard() {
+        for (rules, standard) in [(fmi2::ALL, Standard::Fmi2), (fmi3::ALL, Standard::Fmi3)] {
+            for interface in Interface::ALL {
+                let mut allowed = rules.iter().filter(|r| r.allows(interface, Instantiated));
+                assert_eq!(allowed.next().is_some(), interface.standard() == standard, "{interface}");
+            }
+        }
     }
 
     #[test]
     fn nothing_but_freeing_is_left_after_a_panic() {
         let broken = |r: &Rule| Interface::ALL.iter().any(|i| r.allows(*i, Phase::Broken));
-        assert!(!ALL.iter().any(broken));
+        assert!(![fmi2::ALL, fmi3::ALL].concat().iter().any(broken));
     }
 }

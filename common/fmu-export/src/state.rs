@@ -2,20 +2,23 @@
 
 use integrators::{Solver, Statistics};
 use model::Model;
+use serde::{Deserialize, Serialize};
 
+use crate::built::Built;
 use crate::inputs::History;
 use crate::phase::{Interface, Phase};
 use crate::table::{Layout, Table};
 
 /// Everything that a run changes.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub struct State<M: Model> {
     pub(crate) interface: Interface,
     pub(crate) phase: Phase,
     pub(crate) values: Vec<f64>,
     /// Start values of the motion group as set; in `values` the computed ones replace them
     pub(crate) motion_start: Vec<f64>,
-    pub(crate) model: Option<M>,
+    pub(crate) model: Option<Built<M>>,
     /// States of the system that the model has chosen
     pub(crate) x: Vec<f64>,
     /// Place of each of them among the declared states

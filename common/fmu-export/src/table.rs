@@ -7,7 +7,7 @@ use std::ops::Range;
 use model::{Causality, Entry, Group, Kind, Model, Variability, Variables, count_states};
 
 use crate::inputs::{PortParameters, PortReset};
-use crate::{SolverCounters, SolverParameters};
+use crate::{SolverCounters, SolverParameters, Standard};
 
 /// Where each group of variables of the model `M` lies in the list, fixed at compile time.
 #[derive(Debug)]
@@ -207,6 +207,12 @@ impl Table {
         let component = self.variables[unknown].name.rsplit('.').next().unwrap_or_default();
         let covers = |name: &str| {
             depends.iter().any(|d| {
+                if let Some(alone) = d.strip_prefix('=') {
+                    return name == alone;
+                }
+                if let Some(group) = d.strip_suffix(".*") {
+                    return name.strip_prefix(group).is_some_and(|rest| rest.starts_with('.'));
+                }
                 if let Some(same) = d.strip_suffix('@') {
                     return name.strip_prefix(same) == Some(component);
                 }
@@ -223,14 +229,19 @@ impl Table {
             .collect()
     }
 
-    /// Hash of the variable table, in the form of a GUID: changes when the interface changes.
+    /// [Hash](Self::hash) of the variable table in the form of a GUID.
     pub(crate) fn token(&self, model: &str) -> String {
+        guid(self.hash(model))
+    }
+
+    /// Hash of the variable table: changes when the interface changes.
+    pub(crate) fn hash(&self, model: &str) -> u128 {
         let mut hash = Fnv::new();
         hash.write(model.as_bytes());
         for Variable { name, entry, .. } in &self.variables {
             hash.write(name.as_bytes());
             hash.write(entry.unit.as_bytes());
-            hash.write(kind_name(entry.kind).as_bytes());
+            hash.write(Standard::Fmi3.type_name(entry.kind).as_bytes());
             if let Kind::Enumeration(t) = entry.kind {
                 t.items.iter().for_each(|i| hash.write(i.name.as_bytes()));
             }
@@ -240,9 +251,14 @@ impl Table {
             }
             entry.depends.iter().for_each(|d| hash.write(d.as_bytes()));
         }
-        let h = format!("{:032x}", hash.0);
-        format!("{{{}-{}-{}-{}-{}}}", &h[..8], &h[8..12], &h[12..16], &h[16..20], &h[20..])
+        hash.0
     }
+}
+
+/// A hash in the form of a GUID.
+pub(crate) fn guid(hash: u128) -> String {
+    let h = format!("{hash:032x}");
+    format!("{{{}-{}-{}-{}-{}}}", &h[..8], &h[8..12], &h[12..16], &h[16..20], &h[20..])
 }
 
 /// The time derivative of a state as a variable.
@@ -265,27 +281,16 @@ const INDICATOR: Entry = {
 };
 
 /// FNV-1a with 128 bits: the same on every platform and toolchain.
-struct Fnv(u128);
+pub(crate) struct Fnv(pub(crate) u128);
 
 impl Fnv {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d)
     }
-    fn write(&mut self, bytes: &[u8]) {
+    pub(crate) fn write(&mut self, bytes: &[u8]) {
         for b in bytes.iter().chain(&[0xff]) {
             self.0 = (self.0 ^ u128::from(*b)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b);
         }
-    }
-}
-
-/// Name of a type as FMI 3.0 spells it.
-pub(crate) const fn kind_name(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Float64 => "Float64",
-        Kind::Int32 => "Int32",
-        Kind::Int64 => "Int64",
-        Kind::Boolean => "Boolean",
-        Kind::Enumeration(_) => "Enumeration",
     }
 }
 

@@ -4,7 +4,7 @@ use model::{Causality, Entry, Kind, Model, Variability};
 
 use crate::phase::{Interface, Phase};
 use crate::state::State;
-use crate::table::{ALL_PARTS, FLOAT, Layout, Variable, allowed, changes_in_a_run, kind_name};
+use crate::table::{ALL_PARTS, FLOAT, Layout, Variable, allowed, changes_in_a_run};
 use crate::{Fault, Instance};
 
 impl<M: Model> Instance<M> {
@@ -18,7 +18,7 @@ impl<M: Model> Instance<M> {
         for reference in references {
             match self.table.access.get(*reference as usize) {
                 Some(access) if access & FLOAT != 0 => needed |= access,
-                _ => return Err(self.wrong_type(*reference, "Float64")),
+                _ => return Err(self.wrong_type(*reference, self.type_name(Kind::Float64))),
             }
         }
         self.refresh(needed & ALL_PARTS)?;
@@ -30,23 +30,27 @@ impl<M: Model> Instance<M> {
 
     fn wrong_type(&self, reference: u32, called: &'static str) -> Fault {
         match self.variable(reference) {
-            Ok(v) => {
-                Fault::WrongType { variable: v.name.clone(), reference, is: kind_name(v.entry.kind), called }
-            }
+            Ok(v) => Fault::WrongType {
+                variable: v.name.clone(),
+                reference,
+                is: self.type_name(v.entry.kind),
+                called,
+            },
             Err(fault) => fault,
         }
     }
 
-    /// Read variables of another type; all of them are stored as whole numbers.
+    /// Read variables of another type; all of them are stored as whole numbers. `put` says whether the
+    /// number fits into the type of the call.
     ///
     /// # Errors
-    /// Unknown references and other types.
+    /// Unknown references, other types, numbers that do not fit.
     pub fn get_whole(
         &mut self,
         references: &[u32],
         called: &'static str,
         is: impl Fn(Kind) -> bool,
-        mut put: impl FnMut(usize, f64),
+        mut put: impl FnMut(usize, f64) -> bool,
     ) -> Result<(), Fault> {
         for reference in references {
             if !is(self.variable(*reference)?.entry.kind) {
@@ -54,7 +58,11 @@ impl<M: Model> Instance<M> {
             }
         }
         for (i, reference) in references.iter().enumerate() {
-            put(i, self.state.values[*reference as usize]);
+            let value = self.state.values[*reference as usize];
+            if !put(i, value) {
+                let variable = self.variable(*reference)?.name.clone();
+                return Err(Fault::TooLarge { variable, value, called });
+            }
         }
         Ok(())
     }
@@ -149,6 +157,11 @@ impl<M: Model> Instance<M> {
 /// Number of references and number of values must agree.
 pub(crate) fn same_length(references: usize, values: usize) -> Result<(), Fault> {
     if references == values { Ok(()) } else { Err(Fault::Length { references, values }) }
+}
+
+/// True if these may be values of these variables: start values, or what may be set.
+pub(crate) fn possible<'a>(entries: impl Iterator<Item = &'a Entry>, values: &[f64]) -> bool {
+    entries.zip(values).all(|(entry, v)| in_range(entry, *v) || v.to_bits() == entry.start.to_bits())
 }
 
 /// True if `value` may be set.

@@ -1,5 +1,7 @@
 //! The methods on offer.
 
+use serde::{Deserialize, Serialize};
+
 use crate::dop853::Dop853;
 use crate::dopri5::DOPRI5;
 use crate::exact::Exact;
@@ -11,7 +13,7 @@ use crate::rodas4::Rodas4;
 use crate::{Complex, stability};
 
 /// An integration method.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Method {
     /// Heun (explicit trapezoidal rule), fixed step, order 2.
     Heun,

@@ -31,7 +31,7 @@ impl<const N: usize> Run<N> {
         Ok(Start { t: self.t, x: self.x, slope })
     }
 
-    /// Moves on to a new state and projects it; the result says whether the projection changed it.
+    /// Moves on to a new state, projects it and clears what has died away; the result says whether that changed it.
     #[inline]
     pub(crate) fn accept<O: Ode<N>, W>(
         &mut self,
@@ -42,11 +42,11 @@ impl<const N: usize> Run<N> {
         self.t = t;
         self.x = *x;
         call.statistics.steps += 1;
-        let changed = call.ode.project(t, &mut self.x).map_err(|source| StepError::Rhs { t, source })?;
-        if changed {
+        let projected = call.ode.project(t, &mut self.x).map_err(|source| StepError::Rhs { t, source })?;
+        if projected {
             all_finite(t, &self.x)?;
         }
-        Ok(changed)
+        Ok(clear_subnormal(&mut self.x) || projected)
     }
 
     /// Shows a step to the observer; true if it ends the run, which then stands where the observer wants it.
@@ -72,6 +72,22 @@ impl<const N: usize> Run<N> {
         }
         Ok(true)
     }
+}
+
+/// Sets subnormal states to zero; true if there were any.
+///
+/// A state that dies away would stay at the smallest subnormal number (5e-324 times 0.9 is rounded to 5e-324), and
+/// processors that handle such numbers in microcode take many times as long for every operation on them.
+#[inline]
+fn clear_subnormal<const N: usize>(x: &mut [f64; N]) -> bool {
+    let mut found = false;
+    for x in x {
+        if x.is_subnormal() {
+            *x = 0.0;
+            found = true;
+        }
+    }
+    found
 }
 
 /// Where an observer ends the run.

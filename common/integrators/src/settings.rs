@@ -1,9 +1,11 @@
 //! What the user chooses.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{Method, SettingsError};
 
 /// Method and accuracy of a solver.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// The integration method.
     pub method: Method,

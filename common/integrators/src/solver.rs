@@ -1,5 +1,7 @@
 //! The solver: settings and the little that a call leaves for the next one.
 
+use serde::{Deserialize, Serialize};
+
 use crate::adaptive::adaptive;
 use crate::dop853::Dop853;
 use crate::dopri5::DOPRI5;
@@ -18,7 +20,7 @@ use crate::{Dense, Method, Ode, Settings, SettingsError, Statistics, StepError};
 /// What an adaptive method remembers from call to call; fixed-step methods remember nothing.
 ///
 /// Part of a saved state: with it a run goes on bit by bit as if it had not been interrupted.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Memory {
     /// Next step size [s]; 0: none yet, the next call guesses one.
     pub step: f64,
@@ -33,7 +35,7 @@ impl Default for Memory {
 }
 
 /// Integrates initial value problems with one method.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Solver {
     settings: Settings,
     memory: Memory,

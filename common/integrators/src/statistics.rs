@@ -1,7 +1,9 @@
 //! What a run costs.
 
+use serde::{Deserialize, Serialize};
+
 /// Counters over all calls that succeeded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Statistics {
     /// Accepted steps.
     pub steps: u64,

@@ -16,7 +16,8 @@
 //! variant), `min`, `max`, `above` (exclusive lower bound), `nominal`, `unit`, `tunable`,
 //! `discrete`, `local`, `exact`, `approx`, `state`, `depends` and, for the time derivative of a state,
 //! `rate_depends`: names or prefixes of inputs and states, as one list `["a", "b"]`, the name of a
-//! constant of type `&[&str]`, or a list of such lists, one per component.
+//! constant of type `&[&str]`, or a list of such lists, one per component. `P.a.@` stands for the same component
+//! of P.a, `P.a.*` for all components without a scalar P.a, `=P.a` for that scalar alone.
 //! A struct with a type parameter `S` is generic over the scalar.
 
 use proc_macro::TokenStream;

@@ -31,6 +31,19 @@ impl<S: Scalar> SymmetricTensor<S> {
         Self { xx, xy: o, xz: o, yy, yz: o, zz }
     }
 
+    /// Nothing.
+    #[must_use]
+    pub fn zero() -> Self {
+        let o = S::lift(0.0);
+        Self::diagonal(o, o, o)
+    }
+
+    /// The symmetric matrix `m`; of the off-diagonal components the upper ones are taken.
+    #[must_use]
+    pub fn from_matrix(m: &nalgebra::Matrix3<S>) -> Self {
+        Self { xx: m.m11, xy: m.m12, xz: m.m13, yy: m.m22, yz: m.m23, zz: m.m33 }
+    }
+
     /// As a matrix.
     pub fn matrix(&self) -> nalgebra::Matrix3<S> {
         let Self { xx, xy, xz, yy, yz, zz } = *self;
@@ -117,6 +130,20 @@ impl<S: Scalar> Variables<S> for [S; 4] {
     #[inline]
     fn store(&self, v: &mut [S]) {
         v[..4].copy_from_slice(self);
+    }
+}
+
+/// A pair, counted from 1.
+impl<S: Scalar> Variables<S> for [S; 2] {
+    const TABLE: &'static [Entry] =
+        &[Entry::scalar("[1]", Kind::Float64), Entry::scalar("[2]", Kind::Float64)];
+    #[inline]
+    fn load(v: &[S]) -> Self {
+        [v[0], v[1]]
+    }
+    #[inline]
+    fn store(&self, v: &mut [S]) {
+        v[..2].copy_from_slice(self);
     }
 }
 

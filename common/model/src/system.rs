@@ -1,6 +1,8 @@
 //! The model trait and the system trait.
 
 use mechanics::Scalar;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use crate::{EvaluationError, ParameterError, Spectrum, Variables};
 
@@ -59,16 +61,17 @@ pub trait Model: Clone + Sized + 'static {
     /// Energies
     type Energy<S: Scalar>: Variables<S>;
     /// Discrete states, changed by [`System::update`] only
-    type Discrete: Copy + Default + PartialEq + std::fmt::Debug;
+    type Discrete: Copy + Default + PartialEq + std::fmt::Debug + Serialize + DeserializeOwned;
 
-    /// Check the parameters and prepare all constants; `start`: start values of the motion group,
+    /// Check the parameters and prepare all constants: the same arguments give the same model to the bit,
+    /// so that a serialised state holds these instead of the model; `start`: start values of the motion group,
     /// which hold constants such as a fixed azimuth.
     ///
     /// # Errors
     /// [`ParameterError`] for values that do not fit together.
     fn new(parameters: &Self::Parameters, start: &Self::Motion<f64>) -> Result<Self, ParameterError>;
 
-    /// Take over changed tunable parameters; nothing else may change.
+    /// Take over changed tunable parameters; nothing else may change, nor does it matter which ones came before.
     fn retune(&mut self, parameters: &Self::Parameters);
 
     /// What differs when a host integrates the states (no projection after steps).
@@ -109,6 +112,17 @@ pub trait System<const N: usize, const Z: usize> {
         t: f64,
         given: &<Self::Model as Model>::Motion<f64>,
     ) -> Result<([f64; N], <Self::Model as Model>::Discrete), ParameterError>;
+
+    /// Discrete states at the end of initialisation, when the inputs are known; until then again with
+    /// every change of an input.
+    fn begin(
+        &self,
+        _x: &[f64; N],
+        _u: &<Self::Model as Model>::Inputs<f64>,
+        d: &<Self::Model as Model>::Discrete,
+    ) -> <Self::Model as Model>::Discrete {
+        *d
+    }
 
     /// Time derivative of the states.
     ///

@@ -3,4 +3,8 @@
 #![forbid(unsafe_code)]
 #![allow(non_snake_case, reason = "names are the papers' symbols: F_A, M, q_ddot")]
 
+pub mod absorber;
+pub mod force_law;
+pub mod parts;
+pub mod port;
 pub mod suspension;

@@ -78,7 +78,11 @@ impl<M: Model> Named<M> {
     pub fn count(&mut self, name: &str) -> f64 {
         let mut count = f64::NAN;
         let references = [self.reference(name)];
-        self.instance.get_whole(&references, "test", |_| true, |_, value| count = value).expect("a counter");
+        let mut put = |_, value| {
+            count = value;
+            true
+        };
+        self.instance.get_whole(&references, "test", |_| true, &mut put).expect("a counter");
         count
     }
 

@@ -1,12 +1,16 @@
 //! Set, Get, doStep and derivatives allocate nothing, counted by the allocator itself.
 
-#![allow(unsafe_code, reason = "a counting allocator")]
+#![allow(unsafe_code, reason = "a counting allocator, calls of exported functions")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::ffi::CString;
+use std::ptr::null;
 
 use export_tests::Named;
+use export_tests::rod::Rod;
 use fmu_export::Interface::{CoSimulationWithEvents, ModelExchange};
+use fmu_export::{Instance, Status};
 use models::suspension::DoubleWishbone;
 
 thread_local! {
@@ -137,5 +141,53 @@ fn model_exchange_does_not_allocate() {
             fmu.instance.get_continuous_states(&mut x).expect("states");
         }
         assert_eq!(COUNT.with(Cell::get) - before, 0, "{settings:?}");
+    }
+}
+
+fmu_export::export!(export_tests::rod::Rod);
+
+/// The same down to the functions of FMI 2.0, which share all but their signatures with those of FMI 3.0.
+#[test]
+fn functions_of_fmi2_do_not_allocate() {
+    use fmi2_functions::*;
+    use fmi2_lifecycle::*;
+
+    let names = Named::<Rod>::default();
+    let (inputs, outputs) =
+        (["A.s", "A.v"].map(|n| names.reference(n)), ["A.F", "w"].map(|n| names.reference(n)));
+    let (spring, steps) = ([names.reference("spring.c")], [names.reference("solver.steps")]);
+    let guid = CString::new(Instance::<Rod>::token()).expect("no zero inside");
+    let (mut values, mut count) = ([0.0; 2], 0);
+    // SAFETY: every pointer is null where the standard allows it, or points to as many values as said.
+    unsafe {
+        let rod = fmi2Instantiate(c"rod".as_ptr(), 1, guid.as_ptr(), null(), null(), 0, 0);
+        assert!(!rod.is_null());
+        let mut start = vec![fmi2SetupExperiment(rod, 0, 0.0, 0.0, 0, 0.0), fmi2EnterInitializationMode(rod)];
+        start.push(fmi2ExitInitializationMode(rod));
+        assert_eq!(start, [Status::Ok; 3]);
+        let before = COUNT.with(Cell::get);
+        for i in 0..10_u32 {
+            let t = 0.1 * f64::from(i);
+            let all = [
+                fmi2SetReal(rod, inputs.as_ptr(), 2, [t.sin(), t.cos()].as_ptr()),
+                fmi2SetReal(rod, spring.as_ptr(), 1, [3.0 + t].as_ptr()),
+                fmi2DoStep(rod, t, 0.1, 1),
+                fmi2GetReal(rod, outputs.as_ptr(), 2, values.as_mut_ptr()),
+                fmi2GetInteger(rod, steps.as_ptr(), 1, &raw mut count),
+                fmi2GetDirectionalDerivative(
+                    rod,
+                    outputs.as_ptr(),
+                    1,
+                    inputs.as_ptr(),
+                    1,
+                    [1.0].as_ptr(),
+                    values.as_mut_ptr(),
+                ),
+            ];
+            assert_eq!(all, [Status::Ok; 6]);
+        }
+        assert_eq!(COUNT.with(Cell::get) - before, 0);
+        assert!(count >= 10);
+        fmi2FreeInstance(rod);
     }
 }

@@ -2,6 +2,8 @@
 
 use export_tests::{Random, sparsity::Sparsity};
 use model::Model;
+use models::absorber::PrimaryOscillator;
+use models::parts::{Bushing, Guide, Load};
 use models::suspension::{DoublePendulum, FourBar, Link2, Link3, StrutLink};
 
 fn declared_are_observed<M: Model>(settings: &[&[(&str, f64)]]) {
@@ -47,4 +49,36 @@ fn strut_link_dependencies_are_exact() {
 fn linkage_dependencies_are_exact() {
     declared_are_observed::<FourBar>(&[&[], &[("stabilisation.kind", 2.0), ("design.P.x", 0.3)]]);
     declared_are_observed::<DoublePendulum>(&[&[]]);
+}
+
+#[test]
+fn dependencies_of_small_parts_are_exact() {
+    declared_are_observed::<Load>(&[&[("force.offset.x", 3.0), ("force.offset.y", 2.0)]]);
+    declared_are_observed::<Bushing>(&[&[]]);
+    declared_are_observed::<Guide>(&[&[("kind.x", 2.0), ("kind.y", 2.0), ("kind.z", 2.0), ("kind.s", 2.0)]]);
+}
+
+#[test]
+fn primary_oscillator_dependencies_are_exact() {
+    let kind = |kind: f64, dof: f64, port: f64| {
+        [
+            ("port.kind", kind),
+            ("dof", dof),
+            ("port.mass", port),
+            ("drive.mass", port),
+            ("use.base", 1.0),
+            ("root.mass", 2.0),
+            ("direction.x", 0.3),
+            ("direction.y", -0.4),
+        ]
+    };
+    let gravity = [("gravity.x", 1.0), ("gravity.y", 2.0), ("gravity.z", 3.0)];
+    declared_are_observed::<PrimaryOscillator>(&[
+        &kind(1.0, 1.0, 1.0),
+        &kind(1.0, 2.0, 1.0),
+        &kind(1.0, 2.0, 2.0),
+        &[&kind(2.0, 2.0, 1.0)[..], &gravity].concat(),
+        &[&kind(2.0, 2.0, 2.0)[..], &gravity].concat(),
+        &[("dof", 2.0), ("ground.stiffness", 10.0)],
+    ]);
 }

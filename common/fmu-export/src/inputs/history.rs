@@ -1,10 +1,12 @@
 //! The last samples of the inputs.
 
+use serde::{Deserialize, Serialize};
+
 /// Samples that a polynomial of degree 3 to the end of a step needs before it.
 const SAMPLES: usize = 3;
 
 /// The last samples of all inputs.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct History {
     /// Times, newest first
     pub(super) t: [f64; SAMPLES],
@@ -19,6 +21,11 @@ impl History {
     /// No samples of `count` inputs.
     pub(crate) fn new(count: usize) -> Self {
         Self { t: [0.0; SAMPLES], u: vec![0.0; SAMPLES * count], len: 0, same: 0 }
+    }
+
+    /// True if it may be a history of `count` inputs.
+    pub(crate) fn fits(&self, count: usize) -> bool {
+        self.u.len() == SAMPLES * count && self.len <= SAMPLES && self.same <= self.len
     }
 
     /// Overwrite with another history, without allocation.

@@ -11,7 +11,7 @@ use model::{
 
 use super::element::field;
 use super::linkage::{Energy, Held, Linkage, PlanarRod, check_plane, plane, world};
-use super::variables::Slot;
+use crate::port::Slot;
 
 /// A rod of given length.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]

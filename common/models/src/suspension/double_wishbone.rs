@@ -11,12 +11,12 @@ use model::{
 
 use super::coordinates::{Coordinates, Orientation};
 use super::inertia::{check_inertia, positive_inertia};
-use super::load::{LoadLaw, PulsePhase};
 use super::parameters::{
     ArmJoint, CarrierJoint, ClosureKind, ForceKind, Parameters, PreloadMode, SceneMotion, StabilisationKind,
 };
 use super::variables::{Dynamics, Energy, Inputs, Motion, THETA_1};
 use super::wishbone::{CARRIER, Closing, LOWER, UPPER, Wishbone, named};
+use crate::force_law::{LoadLaw, PulsePhase};
 
 /// Largest ratio of masses that passes without a warning.
 const MASS_RATIO: f64 = 1e6;

@@ -13,7 +13,7 @@ use mechanics::{Body, Dim, Hinged, Load, Loaded, Point, Pose, Rigid, Scalar, Spa
 use model::{EvaluationError, SymmetricTensor, Vector3};
 
 use super::coordinates::{Coordinates, Orientation};
-use super::variables::{Root, Slot};
+use crate::port::{Root, Slot};
 
 /// Constants of an element.
 #[derive(Debug, Clone, Copy)]
@@ -113,7 +113,7 @@ where
         p: &Vector<f64, D>,
         slots: &[&Slot<S>],
     ) -> LoadAt<S, D, N> {
-        super::wishbone::slots(slots).map(|load| (at.pose.point(p), load))
+        crate::port::slots(slots).map(|load| (at.pose.point(p), load))
     }
 
     /// The element with its loads, seen from its root (12a), (12b).

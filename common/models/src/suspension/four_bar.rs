@@ -19,7 +19,7 @@ use model::{
 use super::element::field;
 use super::linkage::{Energy, Held, Linkage, PlanarRod, check_plane, length, plane, world};
 use super::parameters::StabilisationParameters;
-use super::variables::Slot;
+use crate::port::Slot;
 
 /// Parameters of the four-bar linkage. Defaults: the Grashof crank-rocker of the reference.
 #[derive(Debug, Clone, PartialEq, Variables)]

@@ -12,7 +12,8 @@ use model::{
 use super::coordinates::{Coordinates, Orientation};
 use super::element::{Element, LoadAt, PosedOf, element_functions, field, restricted, tensor};
 use super::rod::{RodParameters, Turning};
-use super::variables::{ElementEnergy as Energy, Root, Slot};
+use super::variables::ElementEnergy as Energy;
+use crate::port::{Root, Slot};
 
 /// Joint of a link at its root
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Enumeration)]

@@ -17,9 +17,10 @@ use model::{
 use super::coordinates::{Coordinates, Orientation};
 use super::element::{Element, LoadAt, PosedOf, element_functions, field, tensor};
 use super::inertia::{check_inertia, positive_inertia};
-use super::load::{LoadLaw, PulsePhase};
-use super::parameters::{ForceKind, LoadParameters};
-use super::variables::{ElementEnergy as Energy, Root, Slot};
+use super::parameters::ForceKind;
+use super::variables::ElementEnergy as Energy;
+use crate::force_law::{LoadLaw, LoadParameters, PulsePhase};
+use crate::port::{Root, Slot};
 
 /// Joint of the carrier at its root
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Enumeration)]

@@ -10,8 +10,8 @@ use mechanics::{
 use model::{EvaluationError, ParameterError, Variables, Vector3};
 
 use super::parameters::{StabilisationKind, StabilisationParameters};
-use super::variables::Slot;
-use super::wishbone::slots;
+use crate::port::Slot;
+use crate::port::slots;
 
 /// Mass and shape of a rod in the plane.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]

@@ -18,7 +18,6 @@ mod inertia;
 pub mod link2;
 pub mod link3;
 mod linkage;
-mod load;
 mod parameters;
 mod rod;
 mod start;
@@ -26,16 +25,16 @@ pub mod strut_link;
 mod variables;
 mod wishbone;
 
+pub use crate::force_law::{LoadParameters, PulsePhase};
 pub use double_pendulum::DoublePendulum;
 pub use double_wishbone::DoubleWishbone;
 pub use four_bar::FourBar;
 pub use link2::Link2;
 pub use link3::Link3;
 pub use linkage::PlanarRod;
-pub use load::PulsePhase;
 pub use parameters::{
-    ArmJoint, CarrierJoint, ClosureKind, ForceKind, LoadParameters, Parameters, PreloadMode, SceneMotion,
-    StabilisationKind, StabilisationParameters,
+    ArmJoint, CarrierJoint, ClosureKind, ForceKind, Parameters, PreloadMode, SceneMotion, StabilisationKind,
+    StabilisationParameters,
 };
 pub use rod::RodParameters;
 pub use strut_link::StrutLink;

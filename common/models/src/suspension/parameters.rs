@@ -3,6 +3,8 @@
 use mechanics::Baumgarte;
 use model::{Enumeration, SymmetricTensor, Variables, Vector3};
 
+use crate::force_law::LoadParameters;
+
 /// Motion of the scene
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Enumeration)]
 pub enum SceneMotion {
@@ -88,33 +90,6 @@ impl StabilisationParameters {
     pub(super) fn terms(&self) -> Baumgarte {
         Baumgarte { a: self.a, b: self.b }
     }
-}
-
-/// Parameters of the internal load.
-#[derive(Debug, Clone, Copy, PartialEq, Variables)]
-#[variables(parameter)]
-pub struct LoadParameters {
-    /// Constant part of the internal load [N]
-    #[var(name = "offset", start = 0.0)]
-    pub offset: Vector3<f64>,
-    /// Amplitude of the internal load [N]
-    #[var(name = "amplitude", start = [0.0, 0.0, 10.0])]
-    pub amplitude: Vector3<f64>,
-    /// Angular frequency of the internal load [rad/s]
-    #[var(name = "omega", start = [10.0, 10.0, 10.0])]
-    pub omega: Vector3<f64>,
-    /// Phase of the internal load [rad]
-    #[var(name = "phase", start = 0.0)]
-    pub phase: Vector3<f64>,
-    /// Amplitude of the half-sine pulse of the internal load [N]
-    #[var(name = "pulse.amplitude", start = 0.0)]
-    pub pulse_amplitude: Vector3<f64>,
-    /// Start of the pulse [s]
-    #[var(name = "pulse.start", start = 0.0)]
-    pub pulse_start: f64,
-    /// Duration of the pulse; 0: none [s]
-    #[var(name = "pulse.duration", start = 0.0, min = 0.0)]
-    pub pulse_duration: f64,
 }
 
 /// Parameters of the double wishbone.

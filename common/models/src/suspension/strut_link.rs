@@ -18,8 +18,8 @@ use model::{
 use super::coordinates::{Coordinates, Orientation};
 use super::element::{Element, LoadAt, PosedOf, element_functions, field, restricted, tensor};
 use super::rod::{RodParameters, Turning};
-use super::variables::{Root, Slot};
 use super::wishbone::span;
+use crate::port::{Root, Slot};
 
 /// Joint of the strut link at its root
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Enumeration)]

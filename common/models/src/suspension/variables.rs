@@ -1,6 +1,8 @@
 //! Inputs and outputs of the double wishbone.
 
-use model::{SymmetricTensor, Variables, Vector3};
+use model::{Variables, Vector3};
+
+use crate::port::Slot;
 
 /// Start value of `lower.angle.theta`: the design position of the defaults [rad]
 pub(super) const THETA_1: f64 = -0.049_958_395_721_942_76;
@@ -109,32 +111,6 @@ const CARRIER_V_Z: &[&str] = &[
 ];
 /// Height and vertical velocity of the tip of the lower link.
 const LOWER_Z: &[&str] = &["lower.angle.theta", "lower.angle_rate.theta"];
-
-/// A slot of a leader port: the load `F - M a` acts on the leader.
-#[derive(Debug, Clone, Copy, PartialEq, Variables)]
-pub struct Slot<S> {
-    /// Force on the leader at rest [N]
-    #[var(name = "F")]
-    pub F: Vector3<S>,
-    /// Inertia behind the port [kg]
-    #[var(name = "M")]
-    pub M: SymmetricTensor<S>,
-}
-
-/// A follower port's motion: given by the leader.
-#[derive(Debug, Clone, Copy, PartialEq, Variables)]
-#[variables(input)]
-pub struct Root<S> {
-    /// Position of the root port [m]
-    #[var(name = "r")]
-    pub r: Vector3<S>,
-    /// Velocity of the root port [m/s]
-    #[var(name = "v")]
-    pub v: Vector3<S>,
-    /// Acceleration of the root port [m/s2]
-    #[var(name = "a")]
-    pub a: Vector3<S>,
-}
 
 /// Inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]

@@ -15,8 +15,9 @@ use mechanics::{
 use model::EvaluationError;
 
 use super::coordinates::Coordinates;
-use super::load::{LoadLaw, PulsePhase};
-use super::variables::{Inputs, Slot};
+use super::variables::Inputs;
+use crate::force_law::{LoadLaw, PulsePhase};
+use crate::port::slots;
 
 /// Numbers of the elements.
 pub(super) const LOWER: usize = 0;
@@ -92,20 +93,6 @@ pub(super) struct Loads<S, const D: usize> {
     pub(super) internal: Option<Vector<S, D>>,
     /// Gravity minus chassis acceleration
     pub(super) field: Option<Vector<S, D>>,
-}
-
-/// The sum of the slots of a port; `None` if nothing acts.
-pub(super) fn slots<S: Scalar, const D: usize>(slots: &[&Slot<S>]) -> Option<Load<S, D>>
-where
-    Dim<D>: Space<D>,
-{
-    let F = slots.iter().fold(Vector::<S, D>::zeros(), |sum, s| sum + Dim::<D>::restrict(&s.F));
-    let M = slots.iter().filter(|s| !s.M.vanishes()).map(|s| {
-        let m = &s.M;
-        Dim::<D>::restrict_tensor(m.xx, m.xy, m.xz, m.yy, m.yz, m.zz)
-    });
-    let M = M.reduce(|sum, m| sum + m);
-    (M.is_some() || !F.iter().all(|f| f.vanishes())).then_some(Load { F, M })
 }
 
 /// Names of the elements for messages.

@@ -1,4 +1,4 @@
-//! The internal load: a law of time for the force at P.
+//! A force that is a law of time: the internal load of a model, and the FMU `load`.
 //!
 //! ```text
 //! F_i = offset_i + amplitude_i sin(omega_i t + phase_i)
@@ -8,11 +8,38 @@
 use std::f64::consts::PI;
 
 use mechanics::{Dim, Scalar, Space, Vector};
+use model::{Variables, Vector3};
+use serde::{Deserialize, Serialize};
 
-use super::LoadParameters;
+/// Parameters of a load.
+#[derive(Debug, Clone, Copy, PartialEq, Variables)]
+#[variables(parameter)]
+pub struct LoadParameters {
+    /// Constant part of the load [N]
+    #[var(name = "offset", start = 0.0)]
+    pub offset: Vector3<f64>,
+    /// Amplitude of the load [N]
+    #[var(name = "amplitude", start = [0.0, 0.0, 10.0])]
+    pub amplitude: Vector3<f64>,
+    /// Angular frequency of the load [rad/s]
+    #[var(name = "omega", start = [10.0, 10.0, 10.0])]
+    pub omega: Vector3<f64>,
+    /// Phase of the load [rad]
+    #[var(name = "phase", start = 0.0)]
+    pub phase: Vector3<f64>,
+    /// Amplitude of the half-sine pulse of the load [N]
+    #[var(name = "pulse.amplitude", start = 0.0)]
+    pub pulse_amplitude: Vector3<f64>,
+    /// Start of the pulse [s]
+    #[var(name = "pulse.start", start = 0.0)]
+    pub pulse_start: f64,
+    /// Duration of the pulse; 0: none [s]
+    #[var(name = "pulse.duration", start = 0.0, min = 0.0)]
+    pub pulse_duration: f64,
+}
 
 /// Where the time stands relative to the pulse; changed by the time events at both ends.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PulsePhase {
     /// Not yet begun
     #[default]
@@ -25,7 +52,7 @@ pub enum PulsePhase {
 
 /// The load law in the space of dimension `D`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct LoadLaw<const D: usize> {
+pub(crate) struct LoadLaw<const D: usize> {
     offset: Vector<f64, D>,
     amplitude: Vector<f64, D>,
     omega: Vector<f64, D>,
@@ -39,7 +66,7 @@ impl<const D: usize> LoadLaw<D>
 where
     Dim<D>: Space<D>,
 {
-    pub(super) fn new(p: &LoadParameters) -> Self {
+    pub(crate) fn new(p: &LoadParameters) -> Self {
         let part = |v| Dim::<D>::restrict(&v);
         Self {
             offset: part(p.offset),
@@ -54,7 +81,7 @@ where
 
     /// Force at P [N].
     #[inline]
-    pub(super) fn force<S: Scalar>(&self, t: S, phase: PulsePhase) -> Vector<S, D> {
+    pub(crate) fn force<S: Scalar>(&self, t: S, phase: PulsePhase) -> Vector<S, D> {
         let mut F = self.offset.map(S::lift);
         for i in 0..D {
             if !self.amplitude[i].vanishes() {
@@ -69,7 +96,7 @@ where
     }
 
     /// Time of the next kink [s].
-    pub(super) fn next_event(&self, phase: PulsePhase) -> Option<f64> {
+    pub(crate) fn next_event(&self, phase: PulsePhase) -> Option<f64> {
         match phase {
             PulsePhase::Before => Some(self.pulse_start),
             PulsePhase::During => Some(self.pulse_start + self.pulse_duration),
@@ -78,7 +105,7 @@ where
     }
 
     /// Phase from `t` on; a pulse of zero duration or zero amplitude never begins.
-    pub(super) fn phase(&self, t: f64) -> PulsePhase {
+    pub(crate) fn phase(&self, t: f64) -> PulsePhase {
         let nothing = self.pulse_duration <= 0.0 || self.pulse_amplitude.iter().all(|a| a.vanishes());
         if nothing || t >= self.pulse_start + self.pulse_duration {
             PulsePhase::After
