@@ -59,10 +59,11 @@ impl Closure {
         let largest = (0..n).map(|i| self.entry(i, i)).fold(0.0, f64::max);
         let scale = rhs.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         if self.factorise(largest) {
-            for i in 0..n {
-                if self.is_left_out(i) && rhs[i].abs() > CONSISTENT * scale {
-                    return Err(Inconsistent { unknown: i, value: rhs[i] });
-                }
+            let left = rhs.iter().enumerate().filter(|(i, _)| self.is_left_out(*i));
+            if let Some((unknown, value)) = left.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+                && value.abs() > CONSISTENT * scale
+            {
+                return Err(Inconsistent { unknown, value: *value });
             }
             self.substitute(rhs);
             return Ok(());
@@ -145,6 +146,8 @@ impl Closure {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
     use super::*;
 
     fn system(rows: &[&[f64]]) -> Closure {

@@ -8,7 +8,7 @@ use crate::scene::SceneError;
 pub enum Error {
     /// The scene cannot be run
     #[error(transparent)]
-    Scene(#[from] SceneError),
+    Scene(Box<SceneError>),
     /// The run failed
     #[error(transparent)]
     Run(#[from] RunError),
@@ -20,6 +20,12 @@ pub enum Error {
         /// Cause
         source: std::io::Error,
     },
+}
+
+impl From<SceneError> for Error {
+    fn from(error: SceneError) -> Self {
+        Self::Scene(Box::new(error))
+    }
 }
 
 /// Why a run failed.

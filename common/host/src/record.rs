@@ -45,16 +45,12 @@ impl Recorder {
                 others.push((column, recorded.clone()));
                 continue;
             }
-            let block = match blocks.iter_mut().find(|b| b.node == recorded.node) {
-                Some(block) => block,
-                None => {
-                    blocks.push(Block { node: recorded.node, references: vec![], columns: vec![] });
-                    let last = blocks.len() - 1;
-                    &mut blocks[last]
-                }
-            };
-            block.references.push(recorded.reference);
-            block.columns.push(column);
+            let place = blocks.iter().position(|b| b.node == recorded.node).unwrap_or_else(|| {
+                blocks.push(Block { node: recorded.node, references: vec![], columns: vec![] });
+                blocks.len() - 1
+            });
+            blocks[place].references.push(recorded.reference);
+            blocks[place].columns.push(column);
         }
         Self {
             names: network.recorded.iter().map(|r| r.name.clone()).collect(),

@@ -43,6 +43,14 @@ impl Scene {
             package.choose(structure);
         }
         let system = package.system()?;
+        Self::build(package, system, fmus)
+    }
+
+    /// A scene from a system that was changed after reading.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn build(package: Package, system: System, fmus: &Path) -> Result<Self, SceneError> {
         let mut network = Network::build(&system, &package, fmus)?;
         let plan = Plan::of(&mut network);
         Ok(Self { package, system, network, plan })
@@ -71,7 +79,12 @@ impl Scene {
             instances.push(node.fmu.instantiate(&node.name, interface)?);
         }
         self.network.set_parameters(&self.system, overrides, &mut instances)?;
-        Ok(Sweeper::new(&self.network, &self.plan, instances, config.alpha))
+        let mut sweeper = Sweeper::new(&self.network, &self.plan, instances, config.alpha);
+        for name in &self.system.settings.assemble {
+            let (node, variable) = self.network.find(name, "assemble")?;
+            sweeper.assemble.push((node, variable.reference));
+        }
+        Ok(sweeper)
     }
 
     /// Runs the scene once.

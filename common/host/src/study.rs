@@ -33,6 +33,9 @@ const LEAST_TIME: f64 = 0.05;
 /// Why there is no study.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
+    /// The scene or its settings
+    #[error(transparent)]
+    Scene(Box<SceneError>),
     /// Nothing to compare
     #[error("the scene records no variables")]
     NothingRecorded,
@@ -49,6 +52,12 @@ pub enum StudyError {
     /// The reference cannot be made
     #[error("no reference: {0}")]
     Failed(Box<Error>),
+}
+
+impl From<SceneError> for StudyError {
+    fn from(error: SceneError) -> Self {
+        Self::Scene(Box::new(error))
+    }
 }
 
 /// One line of the table.
@@ -154,7 +163,7 @@ pub fn study(
     overrides: &[Override],
     runs: u32,
     progress: &mut dyn FnMut(f64),
-) -> Result<Study, StudyFailure> {
+) -> Result<Study, StudyError> {
     let base = Config::new(
         &scene.system,
         &Choices { method: Some("common".into()), integrator: Some("dopri5".into()), ..choices.clone() },
@@ -179,17 +188,6 @@ pub fn study(
     Ok(Study { scene: scene.system.name.clone(), reference_agreement: reference.agreement, points, orders })
 }
 
-/// Errors of a study: of its making or of the scene.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyFailure {
-    /// The scene
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The study
-    #[error(transparent)]
-    Study(#[from] StudyError),
-}
-
 fn settings(family: &Family, base: &Config) -> Vec<f64> {
     if family.adaptive {
         return TOLERANCES.to_vec();
@@ -202,7 +200,7 @@ fn configured(family: &Family, setting: f64, base: &Config) -> Config {
     let Family { method, integrator, order, adaptive, .. } = *family;
     let (step, rtol, atol) =
         if adaptive { (None, setting, setting) } else { (Some(setting), base.rtol, base.atol) };
-    Config { method, integrator, order, step, rtol, atol, ..*base }
+    Config { method, integrator, step, rtol, atol, order, ..*base }
 }
 
 fn reference(scene: &Scene, base: &Config, overrides: &[Override]) -> Result<Reference, StudyError> {
@@ -216,7 +214,7 @@ fn reference(scene: &Scene, base: &Config, overrides: &[Override]) -> Result<Ref
         scene
             .run(&config, overrides, &mut recorder, &mut |_| ())
             .map_err(|e| StudyError::Failed(Box::new(e)))?;
-        Ok(recorder.rows)
+        Ok::<_, StudyError>(recorder.rows)
     };
     let (rows, second) = (run(Integrator::Dop853)?, run(Integrator::Dopri5)?);
     let nominal = scene

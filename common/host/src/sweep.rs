@@ -105,6 +105,8 @@ pub struct Sweeper {
     before: Vec<f64>,
     references: Vec<u32>,
     scratch: Vec<f64>,
+    /// Start parameters that may change to close the joints: component and value reference
+    pub assemble: Vec<(usize, u32)>,
     /// Time of messages [s]
     pub t: f64,
     /// Sweeps so far
@@ -182,6 +184,7 @@ impl Sweeper {
             before: vec![0.0; network.signals.len()],
             references: Vec::with_capacity(network.sinks.len()),
             scratch: Vec::with_capacity(network.sinks.len().max(network.signals.len())),
+            assemble: Vec::new(),
             rows,
             instances,
             t: 0.0,
@@ -195,6 +198,7 @@ impl Sweeper {
     }
 
     /// The error of a call of a component.
+    #[must_use]
     pub fn failed(&self, node: usize, fault: Fault) -> RunError {
         RunError::Call {
             t: self.t,
@@ -344,11 +348,7 @@ impl Sweeper {
     /// A call that fails, a closure or loop without solution.
     pub fn sweep(&mut self) -> Result<(), RunError> {
         self.sweeps += 1;
-        self.unknowns.fill(0.0);
-        let base = std::mem::take(&mut self.base);
-        let result = base.iter().try_for_each(|call| self.call(call));
-        self.base = base;
-        result?;
+        self.sweep_open()?;
         let mut solver = std::mem::replace(&mut self.solver, Solver::None);
         let result = self.close(&mut solver);
         self.solver = solver;
@@ -490,6 +490,18 @@ impl Sweeper {
         Err(self.no_solution())
     }
 
+    /// Brings positions and velocities in step, with the joints open.
+    ///
+    /// # Errors
+    /// A call that fails.
+    pub fn sweep_open(&mut self) -> Result<(), RunError> {
+        self.unknowns.fill(0.0);
+        let base = std::mem::take(&mut self.base);
+        let result = base.iter().try_for_each(|call| self.call(call));
+        self.base = base;
+        result
+    }
+
     /// Largest distance and relative velocity of the closing joints, and where [m, m/s].
     #[must_use]
     pub fn gap(&self) -> Option<(f64, f64, &str)> {
@@ -507,12 +519,15 @@ impl Sweeper {
         worst
     }
 
-    /// Differences of position of all joint directions [m].
-    pub fn distances(&self) -> impl Iterator<Item = f64> {
-        self.rows.iter().filter_map(|row| match row {
-            Row::Joint(axis) => Some(self.values[axis.r[0]] - self.values[axis.r[1]]),
-            Row::Cut(_) => None,
-        })
+    /// Differences of position and of velocity of all joint directions [m], [m/s].
+    #[must_use]
+    pub fn gaps(&self) -> Vec<f64> {
+        let d = |[first, second]: [usize; 2]| self.values[first] - self.values[second];
+        let of = |row: &Row| match row {
+            Row::Joint(axis) => vec![d(axis.r), d(axis.v)],
+            Row::Cut(_) => vec![],
+        };
+        self.rows.iter().flat_map(of).collect()
     }
 }
 

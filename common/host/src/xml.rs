@@ -114,6 +114,8 @@ fn element(start: &BytesStart<'_>) -> Result<Element, String> {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
     use super::*;
 
     #[test]

@@ -6,8 +6,9 @@ use clap::{Args, Parser, Subcommand};
 
 use super::CommandError;
 use crate::methods::Choices;
-use crate::scene::Override;
-use crate::ssp::ParameterValue;
+use crate::run::Scene;
+use crate::scene::{Override, SceneError};
+use crate::ssp::{Package, ParameterValue};
 
 /// Scenes of FMUs that pass motion forward and force backward.
 #[derive(Parser)]
@@ -81,7 +82,10 @@ pub(super) struct Run {
     /// Interval of recording [s]
     #[arg(long)]
     interval: Option<f64>,
-    /// A parameter or start value, may be repeated
+    /// Followers give their true force instead of bias force and inertia
+    #[arg(long)]
+    raw: bool,
+    /// A parameter or start value, may be repeated; component * means all that have it
     #[arg(long = "set", value_name = "COMPONENT.VARIABLE=VALUE")]
     set: Vec<String>,
 }
@@ -99,6 +103,17 @@ impl Run {
             stop: self.stop,
             interval: self.interval,
         }
+    }
+
+    /// The scene as the options want it.
+    pub(super) fn scene(&self) -> Result<Scene, SceneError> {
+        let mut package = Package::open(&self.place.path)?;
+        if let Some(structure) = &self.place.structure {
+            package.choose(structure);
+        }
+        let system = package.system()?;
+        let system = if self.raw { system.raw() } else { system };
+        Scene::build(package, system, &self.place.fmus)
     }
 
     pub(super) fn overrides(&self) -> Result<Vec<Override>, CommandError> {

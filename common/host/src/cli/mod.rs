@@ -32,7 +32,7 @@ use arguments::{Arguments, Command};
 #[derive(Debug, thiserror::Error)]
 enum CommandError {
     #[error(transparent)]
-    Run(#[from] Error),
+    Run(Box<Error>),
     #[error(transparent)]
     Study(#[from] StudyError),
     #[error("{path}: {source}")]
@@ -47,18 +47,29 @@ enum CommandError {
     Assignment(String),
 }
 
+impl From<Error> for CommandError {
+    fn from(error: Error) -> Self {
+        Self::Run(Box::new(error))
+    }
+}
+
 impl From<SceneError> for CommandError {
     fn from(error: SceneError) -> Self {
-        Self::Run(error.into())
+        Error::from(error).into()
     }
 }
 
 impl CommandError {
     fn code(&self) -> u8 {
         match self {
-            Self::Write { .. } | Self::Run(Error::Output { .. }) => 1,
-            Self::Run(Error::Scene(_)) | Self::Read { .. } | Self::Plan { .. } | Self::Assignment(_) => 2,
-            Self::Run(Error::Run(_)) | Self::Sweep { .. } | Self::Study(_) => 3,
+            Self::Run(error) => match **error {
+                Error::Output { .. } => 1,
+                Error::Scene(_) => 2,
+                Error::Run(_) => 3,
+            },
+            Self::Write { .. } => 1,
+            Self::Read { .. } | Self::Plan { .. } | Self::Assignment(_) => 2,
+            Self::Sweep { .. } | Self::Study(_) => 3,
         }
     }
 }

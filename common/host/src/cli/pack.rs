@@ -4,12 +4,11 @@ use serde_json::json;
 
 use super::arguments::Pack;
 use super::{Answer, CommandError};
-use crate::error::Error;
+use crate::scene::SceneError;
 use crate::ssp;
 
 pub(super) fn pack(options: &Pack) -> Result<Answer, CommandError> {
-    let entries = ssp::pack(&options.folder, &options.fmus, &options.output)
-        .map_err(|error| CommandError::Run(Error::Scene(error.into())))?;
+    let entries = ssp::pack(&options.folder, &options.fmus, &options.output).map_err(SceneError::from)?;
     let text = format!("{}: {} entries\n", options.output.display(), entries.len());
     Ok(Answer { text, json: json!({"output": options.output, "entries": entries}) })
 }

@@ -14,8 +14,7 @@ use crate::record::Recorder;
 use crate::run::{Cost, Scene};
 
 pub(super) fn simulate(options: &Simulate) -> Result<Answer, CommandError> {
-    let place = &options.run.place;
-    let scene = Scene::load(&place.path, &place.fmus, place.structure.as_deref())?;
+    let scene = options.run.scene()?;
     let config = Config::new(&scene.system, &options.run.choices())?;
     let mut recorder = scene.recorder(&config);
     let mut progress = Progress::new();

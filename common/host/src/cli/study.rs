@@ -8,13 +8,10 @@ use serde_json::json;
 use super::arguments::Study as Options;
 use super::progress::Progress;
 use super::{Answer, CommandError};
-use crate::error::Error;
-use crate::run::Scene;
-use crate::study::{self, Study, StudyFailure};
+use crate::study::{self, Study, StudyError};
 
 pub(super) fn study(options: &Options) -> Result<Answer, CommandError> {
-    let place = &options.run.place;
-    let scene = Scene::load(&place.path, &place.fmus, place.structure.as_deref())?;
+    let scene = options.run.scene()?;
     let mut progress = Progress::new();
     let overrides = options.run.overrides()?;
     let result = study::study(&scene, &options.run.choices(), &overrides, options.runs, &mut |part| {
@@ -22,8 +19,8 @@ pub(super) fn study(options: &Options) -> Result<Answer, CommandError> {
     });
     drop(progress);
     let study = result.map_err(|failure| match failure {
-        StudyFailure::Scene(error) => CommandError::Run(Error::Scene(error)),
-        StudyFailure::Study(error) => CommandError::Study(error),
+        StudyError::Scene(error) => (*error).into(),
+        other => CommandError::Study(other),
     })?;
     if let Some(path) = &options.output {
         write(&study, path)?;

@@ -21,7 +21,6 @@ use serde_json::{Value, json};
 use super::arguments::Sweep;
 use super::progress::Progress;
 use super::{Answer, CommandError};
-use crate::error::Error;
 use crate::methods::{Choices, Config};
 use crate::run::Scene;
 use crate::scene::{Override, SceneError};
@@ -196,12 +195,7 @@ fn row(
     };
     let mut recorder = scene.recorder(config);
     let result = scene.run(config, chosen, &mut recorder, &mut |_| ());
-    let status = match &result {
-        Ok(_) => "ok".to_owned(),
-        Err(Error::Output { .. }) | Err(_) => {
-            result.as_ref().err().map_or(String::new(), |e| e.to_string().replace('\n', " "))
-        }
-    };
+    let status = result.as_ref().err().map_or("ok".into(), |e| e.to_string().replace('\n', " "));
     let mut row = vec![index.to_string(), status];
     row.extend(chosen.iter().map(|(_, value)| match value {
         ParameterValue::Text(text) => text.clone(),
@@ -211,7 +205,7 @@ fn row(
         let values = || recorder.rows.iter().map(|row| row[column]);
         let shown =
             |value: Option<f64>| value.filter(|_| result.is_ok()).map_or(String::new(), |v| v.to_string());
-        row.push(shown(values().last()));
+        row.push(shown(values().next_back()));
         row.push(shown(values().reduce(f64::min)));
         row.push(shown(values().reduce(f64::max)));
     }

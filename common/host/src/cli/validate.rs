@@ -6,15 +6,13 @@ use super::arguments::Run;
 use super::{Answer, CommandError};
 use crate::error::Error;
 use crate::methods::Config;
-use crate::run::Scene;
 use crate::start;
 
 pub(super) fn validate(options: &Run) -> Result<Answer, CommandError> {
-    let place = &options.place;
-    let scene = Scene::load(&place.path, &place.fmus, place.structure.as_deref())?;
+    let scene = options.scene()?;
     let config = Config::new(&scene.system, &options.choices())?;
     let mut sweeper = scene.instantiate(&config, &options.overrides()?)?;
-    start::initialise(&mut sweeper, &config).map_err(Error::Run)?;
+    start::initialise(&mut sweeper, &config).map_err(Error::from)?;
     let gap = sweeper.gap().map(|(position, _, _)| position);
     let text = format!(
         "{} is valid: {} components, {} connections, method {}\n",

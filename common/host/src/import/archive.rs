@@ -150,6 +150,8 @@ impl Archive {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
     use std::io::Write;
 
     use zip::ZipWriter;

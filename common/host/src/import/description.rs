@@ -74,6 +74,7 @@ pub struct Variable {
 
 /// What an FMU can do under one interface.
 #[derive(Clone, Debug, Default)]
+#[allow(clippy::struct_excessive_bools, reason = "flags of the standard")]
 pub struct Capabilities {
     /// Name of the library
     pub identifier: String,

@@ -304,5 +304,5 @@ fn integrator(error: StepError<RunError>) -> Error {
 
 fn refused(error: NotExplicit) -> Error {
     let wanted = error.to_string();
-    Error::Scene(SceneError::Setting { name: "integrator", value: String::new(), wanted })
+    SceneError::Setting { name: "integrator", value: String::new(), wanted }.into()
 }

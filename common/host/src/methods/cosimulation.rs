@@ -108,12 +108,11 @@ impl Run<'_> {
 
     /// From one communication point to the next.
     fn advance(&mut self, recorder: &mut Recorder) -> Result<(), Error> {
-        match self.config.method {
-            MethodKind::CsPece => self.corrected(recorder)?,
-            _ => {
-                let h = self.next_grid_point() - self.t;
-                self.step_to_event_mode(h, None, false)?;
-            }
+        if self.config.method == MethodKind::CsPece {
+            self.corrected(recorder)?;
+        } else {
+            let end = self.next_grid_point();
+            self.step_to_event_mode(end, false, false)?;
         }
         self.update()?;
         self.steps.accepted += 1;
@@ -126,16 +125,17 @@ impl Run<'_> {
         self.config.point(self.grid, self.step)
     }
 
-    /// From Event Mode over Step Mode to Event Mode at `t + h`.
-    fn step_to_event_mode(&mut self, h: f64, ends: Option<()>, may_restore: bool) -> Result<(), RunError> {
+    /// From Event Mode over Step Mode to Event Mode at `end`; `with_kept`: with the inputs kept from the predicted end.
+    fn step_to_event_mode(&mut self, end: f64, with_kept: bool, may_restore: bool) -> Result<(), RunError> {
         let Self { sweeper, kept, t, .. } = self;
+        let h = end - *t;
         sweeper.each(|_, instance| instance.enter_step_mode())?;
-        if ends.is_some() {
+        if with_kept {
             sweeper.set_inputs(kept)?;
         }
         (0..sweeper.instances.len()).try_for_each(|node| do_step(sweeper, node, *t, h, may_restore))?;
-        *t += h;
-        sweeper.t = *t;
+        *t = end;
+        sweeper.t = end;
         sweeper.invalidate();
         sweeper.each(|_, instance| instance.enter_event_mode())
     }
@@ -150,14 +150,12 @@ impl Run<'_> {
             let end = if self.config.step.is_some() { self.next_grid_point() } else { self.reach(recorder) };
             let h = end - start;
             self.inputs.set_all(self.sweeper, Treatment::Extrapolate, order)?;
-            self.step_to_event_mode(h, None, true)?;
+            self.step_to_event_mode(end, false, true)?;
             self.sweeper.sweep()?;
             self.keep();
             self.restore(start)?;
             self.inputs.set_all(self.sweeper, Treatment::Endpoint, order + 1)?;
-            self.step_to_event_mode(h, Some(()), true)?;
-            self.t = end;
-            self.sweeper.t = end;
+            self.step_to_event_mode(end, true, true)?;
             self.sweeper.sweep()?;
             if self.config.step.is_some() {
                 return Ok(());

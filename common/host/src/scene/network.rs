@@ -221,9 +221,9 @@ impl Network {
 
 /// Whether the connections of ports leave out the y components everywhere.
 fn is_planar(connections: &[Connection]) -> bool {
-    let spatial = |name: &str| name.ends_with(".y");
-    let vector = |name: &str| name.ends_with(".x") || name.ends_with(".z");
-    connections.iter().any(|c| vector(&c.to.1)) && !connections.iter().any(|c| spatial(&c.to.1))
+    let component = |c: &Connection| c.to.1.rsplit_once('.').map(|(_, last)| last.to_owned());
+    let any = |wanted: &str| connections.iter().any(|c| component(c).as_deref() == Some(wanted));
+    (any("x") || any("z")) && !any("y")
 }
 
 struct Builder {

@@ -110,8 +110,35 @@ impl Network {
             }
         }
         for (name, value) in overrides {
-            let (node, variable) = self.find(name, "option --set")?;
-            set(&self.nodes[node], &mut instances[node], &variable.name, value)?;
+            match name.strip_prefix("*.") {
+                Some(variable) => self.set_everywhere(variable, value, instances)?,
+                None => {
+                    let (node, variable) = self.find(name, "option --set")?;
+                    set(&self.nodes[node], &mut instances[node], &variable.name, value)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets a parameter of every component that has it; one must.
+    fn set_everywhere(
+        &self,
+        name: &str,
+        value: &ParameterValue,
+        instances: &mut [Instance],
+    ) -> Result<(), SceneError> {
+        let has = |node: &Node| node.fmu.description.variable(name).is_some();
+        if !self.nodes.iter().any(has) {
+            let place = "option --set".into();
+            return Err(SceneError::Component {
+                place,
+                name: format!("*.{name}"),
+                known: "none has it".into(),
+            });
+        }
+        for (node, instance) in self.nodes.iter().zip(instances).filter(|(node, _)| has(node)) {
+            set(node, instance, name, value)?;
         }
         Ok(())
     }

@@ -25,6 +25,22 @@ pub struct System {
     pub stop: Option<f64>,
 }
 
+impl System {
+    /// The same with raw connections: followers give their true force `F` instead of `F0` and `M`.
+    #[must_use]
+    pub fn raw(&self) -> Self {
+        let mut raw = self.clone();
+        raw.connections.retain(|c| !c.from.1.split('.').any(|part| part == "M"));
+        for connection in &mut raw.connections {
+            connection.from.1 = connection.from.1.replace(".F0.", ".F.");
+            if let Some(port) = connection.from.1.strip_suffix(".F0") {
+                connection.from.1 = format!("{port}.F");
+            }
+        }
+        raw
+    }
+}
+
 /// A component.
 #[derive(Clone, Debug, Default)]
 pub struct Component {

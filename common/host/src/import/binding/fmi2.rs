@@ -271,8 +271,7 @@ impl Instance {
         call!(self.fmi2SetFMUstate(saved.0))
     }
 
-    pub(crate) fn forget(&mut self, saved: Saved) -> Result<(), Fault> {
-        let mut state = saved.0;
+    pub(crate) fn forget(&mut self, Saved(mut state): Saved) -> Result<(), Fault> {
         call!(self.fmi2FreeFMUstate(&raw mut state))
     }
 

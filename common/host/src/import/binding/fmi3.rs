@@ -305,8 +305,7 @@ impl Instance {
         call!(self.fmi3SetFMUState(saved.0))
     }
 
-    pub(crate) fn forget(&mut self, saved: Saved) -> Result<(), Fault> {
-        let mut state = saved.0;
+    pub(crate) fn forget(&mut self, Saved(mut state): Saved) -> Result<(), Fault> {
         call!(self.fmi3FreeFMUState(&raw mut state))
     }
 

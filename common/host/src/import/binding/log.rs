@@ -21,9 +21,9 @@ struct Kept {
 }
 
 impl Log {
-    /// The pointer that the FMU hands back with every message; valid while the log lives in its box.
-    pub(super) fn environment(self: &Box<Self>) -> *mut c_void {
-        std::ptr::from_ref::<Self>(self).cast_mut().cast()
+    /// The pointer that the FMU hands back with every message; valid while the log stays in its place.
+    pub(super) fn environment(&self) -> *mut c_void {
+        std::ptr::from_ref(self).cast_mut().cast()
     }
 
     /// All messages so far; they are forgotten here.
