@@ -27,8 +27,10 @@ pub fn initialise(sweeper: &mut Sweeper, config: &Config) -> Result<(), RunError
     if !sweeper.assemble.is_empty() {
         assemble(sweeper)?;
     }
-    sweeper.sweep_open()?;
-    check_gap(sweeper)?;
+    if sweeper.gap().is_some() {
+        sweeper.sweep_open()?;
+        check_gap(sweeper)?;
+    }
     sweeper.sweep()?;
     sweeper.each(|_, instance| instance.exit_initialization())
 }

@@ -158,7 +158,7 @@ pub(super) fn sweep(options: &Sweep) -> Result<Answer, CommandError> {
     for row in rows {
         failed += usize::from(row?);
     }
-    results.sort()?;
+    sort(&results.path, &results.header)?;
     if failed > 0 {
         return Err(CommandError::Sweep { failed, runs: combinations.len(), path: options.output.clone() });
     }
@@ -216,8 +216,11 @@ impl Results {
     /// Opens the file and says which runs are done, and whether well.
     fn open(path: &Path, header: Vec<String>) -> Result<(Self, HashMap<usize, bool>), CommandError> {
         let error = |source| CommandError::Write { path: path.into(), source };
-        let done = if path.exists() { Self::done(path, &header)? } else { HashMap::new() };
         let new = !path.exists();
+        let done = if new { HashMap::new() } else { Self::done(path, &header)? };
+        if !new {
+            sort(path, &header)?; // drops a row that was cut off
+        }
         let file = OpenOptions::new().create(true).append(true).open(path).map_err(error)?;
         let mut writer = csv::Writer::from_writer(file);
         if new {
@@ -229,7 +232,7 @@ impl Results {
 
     fn done(path: &Path, header: &[String]) -> Result<HashMap<usize, bool>, CommandError> {
         let read = |e: csv::Error| CommandError::Read { path: path.into(), source: e.into() };
-        let mut reader = csv::Reader::from_path(path).map_err(read)?;
+        let mut reader = csv::ReaderBuilder::new().flexible(true).from_path(path).map_err(read)?;
         let found: Vec<String> = reader.headers().map_err(read)?.iter().map(String::from).collect();
         if found != header {
             let source = PlanError::Columns { found: found.join(", "), wanted: header.join(", ") };
@@ -246,23 +249,23 @@ impl Results {
         writer.write_record(row).map_err(|e| error(e.into()))?;
         writer.flush().map_err(error)
     }
+}
 
-    /// Rows in the order of the grid.
-    fn sort(&self) -> Result<(), CommandError> {
-        let error = |source| CommandError::Write { path: self.path.clone(), source };
-        let mut reader =
-            csv::ReaderBuilder::new().flexible(true).from_path(&self.path).map_err(|e| error(e.into()))?;
-        let mut rows: BTreeMap<usize, csv::StringRecord> = BTreeMap::new();
-        for record in reader.records().filter_map(Result::ok).filter(|r| r.len() == self.header.len()) {
-            if let Some(index) = record.get(0).and_then(|i| i.parse().ok()) {
-                rows.insert(index, record);
-            }
+/// Whole rows in the order of the grid.
+fn sort(path: &Path, header: &[String]) -> Result<(), CommandError> {
+    let error = |source| CommandError::Write { path: path.into(), source };
+    let failed = |e: csv::Error| error(e.into());
+    let mut reader = csv::ReaderBuilder::new().flexible(true).from_path(path).map_err(failed)?;
+    let mut rows: BTreeMap<usize, csv::StringRecord> = BTreeMap::new();
+    for record in reader.records().filter_map(Result::ok).filter(|r| r.len() == header.len()) {
+        if let Some(index) = record.get(0).and_then(|i| i.parse().ok()) {
+            rows.insert(index, record);
         }
-        let mut sorted = csv::Writer::from_path(&self.path).map_err(|e| error(e.into()))?;
-        sorted.write_record(&self.header).map_err(|e| error(e.into()))?;
-        for record in rows.values() {
-            sorted.write_record(record).map_err(|e| error(e.into()))?;
-        }
-        sorted.flush().map_err(error)
     }
+    let mut sorted = csv::Writer::from_path(path).map_err(failed)?;
+    sorted.write_record(header).map_err(failed)?;
+    for record in rows.values() {
+        sorted.write_record(record).map_err(failed)?;
+    }
+    sorted.flush().map_err(error)
 }
