@@ -82,7 +82,8 @@ fn plan(folder: &Path, masses: &str) -> String {
     let path = folder.join("plan.toml");
     let scene = root().canonicalize().unwrap().join(PENDULUM);
     let text = format!(
-        "scene = {scene:?}\nintegrator = \"rk4\"\nH = 0.01\n[grid]\n\"upper.mass\" = {masses}\n\"lower.length\" = [0.5, 1]\n"
+        "scene = \"{}\"\nintegrator = \"rk4\"\nH = 0.01\n[grid]\n\"upper.mass\" = {masses}\n\"lower.length\" = [0.5, 1]\n",
+        scene.display()
     );
     fs::write(&path, text).unwrap();
     path.to_str().unwrap().into()

@@ -110,12 +110,11 @@ impl Network {
             }
         }
         for (name, value) in overrides {
-            match name.strip_prefix("*.") {
-                Some(variable) => self.set_everywhere(variable, value, instances)?,
-                None => {
-                    let (node, variable) = self.find(name, "option --set")?;
-                    set(&self.nodes[node], &mut instances[node], &variable.name, value)?;
-                }
+            if let Some(variable) = name.strip_prefix("*.") {
+                self.set_everywhere(variable, value, instances)?;
+            } else {
+                let (node, variable) = self.find(name, "option --set")?;
+                set(&self.nodes[node], &mut instances[node], &variable.name, value)?;
             }
         }
         Ok(())
