@@ -332,8 +332,8 @@ def test_fixed_parameters_cannot_be_set_in_a_run(running):
 def test_calls_in_the_wrong_phase(instance, wishbone):
     expect_error(instance.try_step(0.0, 0.1))
     expect_error(instance.call("fmi3ExitInitializationMode"))
-    value = (c_uint * 1)(wishbone.variable("carrier.mass").valueReference)
-    expect_error(instance.call("fmi3GetFloat64", value, 1, (c_double * 1)(), 1))
+    height = (c_uint * 1)(wishbone.variable("P.r.z").valueReference)
+    expect_error(instance.call("fmi3GetFloat64", height, 1, (c_double * 1)(), 1), "P.r.z")
     expect_error(instance.call("fmi3EnterEventMode"))
     instance.initialise({})
     expect_error(instance.call("fmi3EnterInitializationMode", False, 0.0, 0.0, False, 0.0))
@@ -345,6 +345,14 @@ def test_calls_in_the_wrong_phase(instance, wishbone):
     assert math.isfinite(instance.get(THETA))
     instance.reset()
     instance.initialise({})
+
+
+def test_start_values_are_read_before_initialisation(instance):
+    """FMI 3.0, state Instantiated: the start value, or what was set."""
+    assert instance.get("carrier.mass") == 25.0
+    instance.set({"carrier.mass": 30.0, "lower.angle.theta": 0.25})
+    assert instance.get("carrier.mass") == 30.0
+    assert instance.get("lower.angle.theta") == 0.25
 
 
 def test_wrong_token_gives_no_instance(wishbone):

@@ -6,6 +6,7 @@ from koppel import library, scenes
 from koppel.scene import Scene, SceneError
 from koppel.scene.network import Network
 from koppel.scene.ports import PAIRS, port, port_names
+from scipy.integrate import solve_ivp
 
 SCENES = ["two_mass", "double_pendulum", "four_bar", "double_wishbone"]
 #: Steps that fit the samples of each scene.
@@ -299,3 +300,41 @@ def test_links_in_line_are_a_singular_closure(fmu):
     scene.close("left.B", "right.B")
     with pytest.raises(SceneError, match=r"inconsistent or singular closure of left.B - right.B at t = 0.005 s"):
         scene.run(integrator="rk4", step=0.01, stop=0.01, interval=0.01)
+
+
+def two_loops(fmu):
+    """Three uprights of 1 m and 1 kg under two bars of the same kind, upright and falling: both loops share the middle one."""
+    weight = {"mass": 1.0, "gravity.z": -9.81}
+    rod, upright = {**weight, "length": 1.0, "angle.theta": 0.0}, {"angle.theta": np.pi / 2, "angle_rate.theta": -1.0}
+    tip = {f"point.{point}.{axis}": value for point in "CP" for axis, value in (("x", 0.0), ("z", 1.0))}
+    inertia = {f"inertia.{axis}": 1.0 / 12.0 for axis in ("xx", "yy", "zz")}
+    scene = Scene("two_loops", fmu)
+    scene.add("left", "link2", **{**rod, **upright})
+    # the middle one has two places for loads at its tip
+    middle = {"com.x": 0.0, "com.z": 0.5, "B.r.x": 1.0, "B.r.z": 0.0, "angle_rate.psi": -1.0, "force.kind": "input"}
+    scene.add("middle", "link3", **weight, **inertia, **tip, **middle)
+    scene.add("right", "link2", **{**rod, **upright, "A.r.x": 2.0})
+    scene.add("bar1", "link2", **rod)
+    scene.add("bar2", "link2", **rod)
+    scene.connect("left.B", "bar1.A")
+    scene.connect("middle.C", "bar2.A")
+    scene.close("bar1.B", "middle.P", alpha=5.0)
+    scene.close("bar2.B", "right.B")
+    scene.record("left.angle.theta", "middle.angle.psi", "right.angle.theta", "bar1.angle.theta", interval=0.05)
+    scene.configure(stop=0.4)
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("how", "limit"), [({"integrator": "rk4", "step": 5e-3}, 1e-9), ({"method": "cs-pece", "H": 2.5e-3}, 1e-4)]
+)
+def test_joints_of_a_scene_are_solved_together(fmu, how, limit):
+    """N-four-bar, N = 2: uprights stay parallel, so that it is one pendulum, before it comes to its singular position:
+    ((N + 1)/3 + N) phi'' = -((N + 1)/2 + N) 9.81 cos(phi)."""
+    result = two_loops(fmu).run(**how)
+    rates = lambda _t, y: [y[1], -3.5 / 3.0 * 9.81 * np.cos(y[0])]
+    phi = solve_ivp(rates, (0.0, 0.4), [np.pi / 2, -1.0], "DOP853", result.t, rtol=1e-12, atol=1e-12).y[0]
+    assert np.ptp(phi) > 0.5
+    for name, zero in (("left.angle.theta", 0.0), ("middle.angle.psi", np.pi / 2), ("right.angle.theta", 0.0)):
+        assert np.abs(result[name] + zero - phi).max() <= limit
+    assert np.abs(result["bar1.angle.theta"]).max() <= limit

@@ -6,6 +6,7 @@ from koppel import Fmu, Reference, library, scenes
 from koppel.scene import Scene, SceneError
 from koppel.scene.common import Common
 from koppel.scene.exchange import _leaders_first
+from koppel.scene.study import raw_variant
 
 THETA = "lower.angle.theta"
 G = 9.81
@@ -168,6 +169,20 @@ def test_without_event_mode_outputs_follow_by_derivatives(fmu, monkeypatch):
         assert np.abs(runs[True, H].values - runs[False, H].values).max() <= 1e-10
         assert runs[False, H].counts["directional"] > 0 and "directional" not in runs[True, H].counts
         assert "fmi3EnterEventMode" not in runs[False, H].calls["leader"]
+
+
+def test_a_loop_without_directional_derivatives_is_solved_by_differences(fmu, monkeypatch):
+    """The loop of the two masses is affine: changes by a unit are as good."""
+    scene = raw_variant(library.scene("two_mass", fmu))
+    options = {"integrator": "rk4", "H": 5e-3, "stop": 0.5}
+    exact = scene.run(**options)
+    has = Fmu.capability
+    monkeypatch.setattr(
+        Fmu, "capability", lambda self, name: name != "providesDirectionalDerivatives" and has(self, name)
+    )
+    differences = scene.run(**options)
+    assert exact.counts["directional"] > 0 and "directional" not in differences.counts
+    assert np.abs(differences.values - exact.values).max() <= 1e-10
 
 
 # plain exchange -----------------------------------------------------------------------------------------------------

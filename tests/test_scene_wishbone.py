@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from koppel import Reference, library, scenes
 from koppel.fmu import FmuError
-from koppel.scene import Diverged
+from koppel.scene import Diverged, Scene
 
 THETA = "lower.angle.theta"
 ANGLES = [THETA, "carrier.angle.psi", "upper.angle.theta"]
@@ -107,3 +107,35 @@ def test_root_forces_of_the_two_chains_are_the_mechanisms(fmu, wishbone):
     result = scene.run(integrator="rk4", step=1e-3, stop=0.5)
     for ours, theirs in zip(result.names[-4:], names):
         assert np.abs(result[ours] - whole[theirs]).max() <= 1e-6 * np.abs(whole.values).max()
+
+
+# compliant joint ----------------------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def bushed(fmu, scene):
+    """The closing joint made of a stiff bushing, as foreign hosts need it."""
+    made = Scene("bushed", fmu)
+    for component in scene.components.values():
+        made.add(component.name, component.fmu, **component.values)
+    made.connect_all(scene.connections)
+    made.add("joint", "bushing")
+    made.connect("carrier.C", "joint.A")
+    made.connect("upper.C", "joint.B")
+    made.record(THETA, interval=0.05)
+    return made
+
+
+# a plain exchange needs H below 2 m/c of what the bushing holds
+@pytest.mark.parametrize(
+    ("method", "H"), [("common", 2e-4), ("cs-predict", 1e-4), ("jacobi", 5e-5), ("seidel", 5e-5)], ids=lambda v: str(v)
+)
+def test_compliant_joint_is_nearly_rigid(scene, bushed, method, H):
+    """Joint forces of up to 25 N open a bushing of 1e6 N/m by 2.5e-5 m, on a link of 0.28 m: 9e-5 rad."""
+    rigid = scene.run(integrator="rk4", step=0.0125, stop=0.2)
+    result = bushed.run(method=method, integrator="rk4", H=H, stop=0.2, values=scenes.fixed("rk4", H))
+    assert np.abs(result[THETA] - rigid[THETA]).max() <= 9e-5
+    assert np.abs(result[THETA] - rigid[THETA])[1:].max() > 1e-7
+
+
+def test_compliant_joint_diverges_where_the_exchange_is_too_slow(bushed):
+    with pytest.raises(Diverged):
+        bushed.run(method="jacobi", H=1e-3, stop=0.2, values=scenes.fixed("rk4", 1e-3))

@@ -55,7 +55,8 @@ def whole(name: str, repeat: int) -> list[Point]:
     folder.mkdir(parents=True, exist_ok=True)
     with library.scene(name) as scene:
         reference = study.reference_of(scene)
-        print(f"{name}, {scene.stop - scene.start:g} s; reference: {'; '.join(reference.source)}")
+        source = [one.removeprefix("source: ") for one in reference.source if one.startswith("source: ")]
+        print(f"{name}, {scene.stop - scene.start:g} s; reference: {' '.join(source)}")
         print(study.HEADER, flush=True)
         options = {"steps": plan.steps, "tolerances": plan.tolerances, "methods": plan.methods, "repeat": repeat}
         points = scene.study(**options, reference=reference, each=lambda point: print(study.line(point), flush=True))

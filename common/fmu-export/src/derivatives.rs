@@ -17,7 +17,7 @@ impl<M: Model> Instance<M> {
     /// outside (Model Exchange, Event Mode), continuous states.
     ///
     /// # Errors
-    /// Other knowns or unknowns; where the equations have no value.
+    /// Other knowns or unknowns; where the equations, or the derivative, have no value.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -49,8 +49,14 @@ impl<M: Model> Instance<M> {
             }
             .map_err(|source| Fault::Evaluation { t, source })?;
         }
+        let derivative = |unknown: &u32| self.duals[*unknown as usize].eps;
+        if let Some(unknown) = unknowns.iter().find(|unknown| !derivative(unknown).is_finite()) {
+            let name = &self.table.variables[*unknown as usize].name;
+            let variable = format!("the directional derivative of {name}");
+            return Err(Fault::NotFinite { variable, value: derivative(unknown), t });
+        }
         for (s, unknown) in sensitivity.iter_mut().zip(unknowns) {
-            *s = self.duals[*unknown as usize].eps;
+            *s = derivative(unknown);
         }
         Ok(())
     }

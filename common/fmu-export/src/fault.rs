@@ -82,6 +82,12 @@ pub enum Fault {
         /// The kind
         kind: u32,
     },
+    /// Variable that is computed, before there is anything to compute it from.
+    #[error("{variable} has no value before initialisation: it is computed and has no start value")]
+    NoValue {
+        /// Variable
+        variable: String,
+    },
     /// Null where data is needed.
     #[error("{argument} is null")]
     Null {
@@ -175,6 +181,16 @@ pub enum Fault {
         value: f64,
         /// Time
         t: f64,
+    },
+    /// Parameters, inputs or start values from which a result at the start is not a number.
+    #[error(
+        "{variable} would be {value} at the start: parameters, inputs and start values do not fit together"
+    )]
+    NotFiniteAtStart {
+        /// Variable
+        variable: String,
+        /// Value
+        value: f64,
     },
     /// The solver gave up.
     #[error("step from {t:.6} s by {step:.3e} s is discarded: {cause}")]

@@ -194,6 +194,7 @@ impl<M: Model> Instance<M> {
         self.assemble()?;
         self.refresh(ALL_PARTS).map_err(|fault| match fault {
             Fault::Evaluation { source, .. } => ParameterError::Start(source).into(),
+            Fault::NotFinite { variable, value, .. } => Fault::NotFiniteAtStart { variable, value },
             other => other,
         })?;
         if let Some(model) = &self.state.model {
@@ -228,7 +229,8 @@ impl<M: Model> Instance<M> {
     /// Compute the parts of the list that `needed` names and that are out of date.
     #[inline]
     pub(crate) fn refresh(&mut self, needed: u8) -> Result<(), Fault> {
-        if needed & !self.state.fresh == 0 && self.state.model.is_some() && !self.state.retune {
+        let known = needed & !self.state.fresh == 0 && self.state.model.is_some() && !self.state.retune;
+        if needed == 0 || known {
             return Ok(());
         }
         self.compute(needed)

@@ -26,6 +26,7 @@ mod standard;
 mod state;
 mod step;
 mod table;
+mod terminals;
 mod unit;
 mod values;
 

@@ -11,6 +11,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use crate::Standard;
 use crate::describe::model_description;
+use crate::terminals::terminals;
 
 /// Everything that can go wrong while packing.
 #[derive(Debug, thiserror::Error)]
@@ -41,13 +42,18 @@ fn contents<M: Model>(
     extension: &str,
 ) -> Result<Vec<(String, Vec<u8>)>, PackError> {
     let binary = format!("binaries/{}/{}.{extension}", standard.platform(), M::NAME);
-    Ok(vec![
+    let mut files = vec![
         (binary, library.to_vec()),
         ("documentation/licenses/license.spdx".into(), b"MIT OR Apache-2.0\n".to_vec()),
         ("documentation/licenses/LICENSE-APACHE".into(), include_bytes!("../../../LICENSE-APACHE").to_vec()),
         ("documentation/licenses/LICENSE-MIT".into(), include_bytes!("../../../LICENSE-MIT").to_vec()),
         ("modelDescription.xml".into(), model_description::<M>(standard)?),
-    ])
+    ];
+    if standard == Standard::Fmi3 {
+        let terminals = terminals::<M>()?;
+        files.extend(terminals.map(|xml| ("terminalsAndIcons/terminalsAndIcons.xml".into(), xml)));
+    }
+    Ok(files)
 }
 
 /// The archive for one version of FMI with the shared library `library` inside.

@@ -149,11 +149,11 @@ pub(crate) mod fmi3 {
         DO_STEP "fmi3DoStep" CS StepMode as u8;
         TERMINATE "fmi3Terminate" FMI3 TERMINABLE;
         RESET "fmi3Reset" FMI3 ANY;
-        GET_FLOAT64 "fmi3GetFloat64" FMI3 RUNNING;
-        GET_INT32 "fmi3GetInt32" FMI3 RUNNING;
-        GET_INT64 "fmi3GetInt64" FMI3 RUNNING;
-        GET_BOOLEAN "fmi3GetBoolean" FMI3 RUNNING;
-        GET_OTHER "fmi3Get{VariableType}" FMI3 RUNNING;
+        GET_FLOAT64 "fmi3GetFloat64" FMI3 ANY;
+        GET_INT32 "fmi3GetInt32" FMI3 ANY;
+        GET_INT64 "fmi3GetInt64" FMI3 ANY;
+        GET_BOOLEAN "fmi3GetBoolean" FMI3 ANY;
+        GET_OTHER "fmi3Get{VariableType}" FMI3 ANY;
         SET_FLOAT64 "fmi3SetFloat64" FMI3 SETTABLE;
         SET_INT32 "fmi3SetInt32" FMI3 SETTABLE;
         SET_INT64 "fmi3SetInt64" FMI3 SETTABLE;
@@ -168,7 +168,7 @@ pub(crate) mod fmi3 {
         DIRECTIONAL_DERIVATIVE "fmi3GetDirectionalDerivative" FMI3 RUNNING;
         DEPENDENCIES "fmi3GetVariableDependencies" FMI3 ANY;
         ENTER_CONTINUOUS_TIME_MODE "fmi3EnterContinuousTimeMode" ME EventMode as u8;
-        SET_TIME "fmi3SetTime" ME EventMode as u8 | ContinuousTimeMode as u8;
+        SET_TIME "fmi3SetTime" ME ContinuousTimeMode as u8;
         SET_CONTINUOUS_STATES "fmi3SetContinuousStates" ME ContinuousTimeMode as u8;
         COMPLETED_INTEGRATOR_STEP "fmi3CompletedIntegratorStep" ME ContinuousTimeMode as u8;
         GET_CONTINUOUS_STATES "fmi3GetContinuousStates" ME RUNNING;

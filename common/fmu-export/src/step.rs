@@ -127,6 +127,11 @@ impl<M: Model> Instance<M> {
             None
         } else {
             self.moving.copy_from_slice(given);
+            self.polynomials.evaluate(to, &mut self.moving);
+            if let Some(i) = self.moving.iter().position(|u| !u.is_finite()) {
+                let variable = self.table.variables[Layout::<M>::INPUTS.start + i].name.clone();
+                return Err(Fault::NotFinite { variable, value: self.moving[i], t: to });
+            }
             self.polynomials.evaluate(from, &mut self.moving);
             Some(Course { polynomials: &self.polynomials, u: &mut self.moving })
         };

@@ -21,9 +21,25 @@ impl<M: Model> Instance<M> {
                 _ => return Err(self.wrong_type(*reference, self.type_name(Kind::Float64))),
             }
         }
-        self.refresh(needed & ALL_PARTS)?;
+        if self.state.phase == Phase::Instantiated {
+            self.have_start(references)?;
+        } else {
+            self.refresh(needed & ALL_PARTS)?;
+        }
         for (value, reference) in values.iter_mut().zip(references) {
             *value = self.state.values[*reference as usize];
+        }
+        Ok(())
+    }
+
+    /// Before initialisation there are start values only.
+    fn have_start(&self, references: &[u32]) -> Result<(), Fault> {
+        let computed = |v: &Variable| v.entry.causality != Causality::Inherit && !v.entry.has_start();
+        for reference in references {
+            let variable = self.variable(*reference)?;
+            if computed(variable) {
+                return Err(Fault::NoValue { variable: variable.name.clone() });
+            }
         }
         Ok(())
     }

@@ -19,6 +19,9 @@
 //! R. H. C. Takahashi, ACM TOMS 47 (2020) (root finder). Left out: integration backwards in time, multistep methods,
 //! sparse matrices.
 //!
+//! Where the number of states is known only at run time, [`ExplicitSolver`] takes the same steps one by one; it allocates when
+//! it is made.
+//!
 //! ```
 //! use integrators::{Method, Ode, Settings, Solver, Statistics};
 //!

@@ -4,10 +4,11 @@ use crate::error::all_finite;
 use crate::one_step::{Call, OneStep, Start};
 use crate::{Dense, Ode, StepError};
 
-/// Most steps that one call may take, rejected ones included: a hundredfold of the longest sensible call.
+/// Most steps that one call may take, rejected ones included: tenfold of the longest sensible call.
 ///
-/// A step size of 1e-300 s, or an explicit method on a very stiff problem, then ends in an error and not in a hang.
-pub const MAX_STEPS: u32 = 10_000_000;
+/// A step size of 1e-300 s, or an explicit method on a very stiff problem, then ends in an error after some seconds
+/// and not in a hang.
+pub const MAX_STEPS: u32 = 1_000_000;
 
 /// Working copy of what a call changes; handed over only when it succeeds.
 #[derive(Clone, Copy)]

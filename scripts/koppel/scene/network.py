@@ -13,7 +13,7 @@ from contextlib import ExitStack
 
 import numpy as np
 
-from ..fmu import Equations, Instance, Value
+from ..fmu import Instance, Value
 from . import ports
 from .closure import Closure
 from .definition import Component, Ref, Scene, start_values
@@ -95,7 +95,7 @@ class Network:
                 raise SceneError(
                     f"{component.name} ({component.fmu.path.name}) has no Model Exchange: use a method on Co-Simulation"
                 )
-            return _Sampled(component.fmu, name=component.name)
+            return component.fmu.equations(name=component.name)
         event_mode = self._event_mode and component.fmu.capability("hasEventMode")
         return component.fmu.instantiate(event_mode=event_mode, name=component.name)
 
@@ -336,12 +336,6 @@ def _copy(u: np.ndarray, y: np.ndarray, run: list[tuple]) -> Operation:
         np.add(target, offset, out=target)
 
     return transform
-
-
-class _Sampled(Equations):
-    """Model Exchange; `event_mode` says that it takes part in event iterations."""
-
-    event_mode = True
 
 
 class _JointPorts:

@@ -1,66 +1,15 @@
 //! The part of FMI 3.0 that a co-simulation run needs, behind a safe interface.
 #![allow(unsafe_code, reason = "calls into a C library; every block states why it is sound")]
 
-use std::cell::RefCell;
-use std::ffi::{CStr, CString, NulError, c_char, c_int, c_void};
-use std::path::{Path, PathBuf};
+use std::ffi::{CString, NulError, c_char};
+use std::path::Path;
 
-use libloading::Library;
+use fmi_capi::fmi3::{
+    DoStep, EnterInitialization, FreeInstance, Get, Instance, InstantiateCoSimulation, Set, Simple,
+};
+use fmi_capi::{Library, Log, OK, Status, WARNING, log_message, status_name};
 
 use crate::job::Value;
-
-/// `fmi3Instance`, never null here.
-type Instance = *mut c_void;
-/// `fmi3Status` as it arrives: any integer.
-type Status = c_int;
-/// `fmi3Boolean` where the FMU writes it: any byte.
-type Flag = u8;
-
-type LogMessage = unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char);
-type IntermediateUpdate = unsafe extern "C" fn();
-
-type Instantiate = unsafe extern "C" fn(
-    name: *const c_char,
-    token: *const c_char,
-    resources: *const c_char,
-    visible: bool,
-    logging_on: bool,
-    event_mode_used: bool,
-    early_return_allowed: bool,
-    required: *const u32,
-    n_required: usize,
-    environment: *mut c_void,
-    log: Option<LogMessage>,
-    intermediate_update: Option<IntermediateUpdate>,
-) -> Instance;
-type FreeInstance = unsafe extern "C" fn(Instance);
-type Simple = unsafe extern "C" fn(Instance) -> Status;
-type EnterInitialization = unsafe extern "C" fn(Instance, bool, f64, f64, bool, f64) -> Status;
-type DoStep = unsafe extern "C" fn(
-    instance: Instance,
-    point: f64,
-    step: f64,
-    no_set_state_prior: bool,
-    event_needed: *mut Flag,
-    terminate: *mut Flag,
-    early_return: *mut Flag,
-    last_time: *mut f64,
-) -> Status;
-type Get<T> = unsafe extern "C" fn(Instance, *const u32, usize, *mut T, usize) -> Status;
-type Set<T> = unsafe extern "C" fn(Instance, *const u32, usize, *const T, usize) -> Status;
-
-const OK: Status = 0;
-const WARNING: Status = 1;
-
-/// Messages kept of one instance; more are dropped and counted.
-const MOST_MESSAGES: usize = 200;
-
-fn name_of(status: Status) -> &'static str {
-    ["OK", "Warning", "Discard", "Error", "Fatal"]
-        .get(usize::try_from(status).unwrap_or(usize::MAX))
-        .copied()
-        .unwrap_or("unknown status")
-}
 
 /// A call that did not return OK or Warning.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,17 +24,15 @@ fn check(function: &'static str, status: Status, time: Option<f64>) -> Result<()
     if status == OK || status == WARNING {
         Ok(())
     } else {
-        Err(Fault { function, status: name_of(status), time })
+        Err(Fault { function, status: status_name(status), time })
     }
 }
 
 /// Why there is no instance.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum LoadError {
-    #[error("cannot load {path}: {source}")]
-    Library { path: PathBuf, source: libloading::Error },
-    #[error("{symbol} is missing: {source}")]
-    Symbol { symbol: &'static str, source: libloading::Error },
+    #[error(transparent)]
+    Library(#[from] fmi_capi::LoadError),
     #[error("text with a zero byte: {0}")]
     ZeroByte(#[from] NulError),
     #[error("no instance was made")]
@@ -101,47 +48,10 @@ impl LoadError {
     /// The function to blame.
     pub(crate) fn function(&self) -> &'static str {
         match self {
-            Self::Library { .. } | Self::ZeroByte(_) => "load",
-            Self::Symbol { symbol, .. } => symbol,
+            Self::Library(fmi_capi::LoadError::Symbol { symbol, .. }) => symbol,
+            Self::Library(_) | Self::ZeroByte(_) => "load",
             Self::Refused { .. } => "fmi3InstantiateCoSimulation",
         }
-    }
-}
-
-/// What the FMU said, in order.
-#[derive(Default)]
-struct Log {
-    messages: RefCell<Vec<String>>,
-}
-
-/// Receives the FMU's messages.
-unsafe extern "C" fn log_message(
-    environment: *mut c_void,
-    status: Status,
-    category: *const c_char,
-    message: *const c_char,
-) {
-    // SAFETY: the environment is the log given at instantiation; it outlives the instance and belongs to this thread,
-    // in which all calls are made.
-    let Some(log) = (unsafe { environment.cast::<Log>().as_ref() }) else {
-        return;
-    };
-    let text = |pointer: *const c_char| {
-        if pointer.is_null() {
-            return "".into();
-        }
-        // SAFETY: not null, and FMI strings end with a zero byte and live during the call.
-        unsafe { CStr::from_ptr(pointer) }.to_string_lossy()
-    };
-    let Ok(mut messages) = log.messages.try_borrow_mut() else {
-        return;
-    };
-    match messages.len() {
-        0..MOST_MESSAGES => {
-            messages.push(format!("{} [{}] {}", name_of(status), text(category), text(message)));
-        }
-        MOST_MESSAGES => messages.push("further messages are left out".into()),
-        _ => {}
     }
 }
 
@@ -158,7 +68,7 @@ struct Functions {
     set_float64: Set<f64>,
     set_int32: Set<i32>,
     set_int64: Set<i64>,
-    set_boolean: Set<bool>,
+    set_boolean: Set<u8>,
     set_string: Set<*const c_char>,
 }
 
@@ -171,37 +81,26 @@ pub(crate) struct Fmi {
     _library: Library,
 }
 
-/// Looks up one function; its type is that of the field or variable it goes to.
-fn symbol<T: Copy>(library: &Library, symbol: &'static str) -> Result<T, LoadError> {
-    // SAFETY: the symbols of an FMI 3.0 library have the types that the standard gives them, which are the ones above;
-    // the pointer is used only while the library is open.
-    let found = unsafe { library.get::<T>(symbol) };
-    found.map(|f| *f).map_err(|source| LoadError::Symbol { symbol, source })
-}
-
 impl Fmi {
     /// Loads the library and makes a co-simulation instance without event mode.
     pub(crate) fn instantiate(path: &Path, token: &str, resources: Option<&str>) -> Result<Self, LoadError> {
-        // SAFETY: loading runs the library's initialisers; it is the FMU that the caller wants to run.
-        let library = unsafe { Library::new(path) }
-            .map_err(|source| LoadError::Library { path: path.into(), source })?;
-        let l = &library;
+        let l = Library::open(path)?;
         let f = Functions {
-            free_instance: symbol(l, "fmi3FreeInstance")?,
-            enter_initialization: symbol(l, "fmi3EnterInitializationMode")?,
-            exit_initialization: symbol(l, "fmi3ExitInitializationMode")?,
-            terminate: symbol(l, "fmi3Terminate")?,
-            reset: symbol(l, "fmi3Reset")?,
-            do_step: symbol(l, "fmi3DoStep")?,
-            get_float64: symbol(l, "fmi3GetFloat64")?,
-            get_int64: symbol(l, "fmi3GetInt64")?,
-            set_float64: symbol(l, "fmi3SetFloat64")?,
-            set_int32: symbol(l, "fmi3SetInt32")?,
-            set_int64: symbol(l, "fmi3SetInt64")?,
-            set_boolean: symbol(l, "fmi3SetBoolean")?,
-            set_string: symbol(l, "fmi3SetString")?,
+            free_instance: l.symbol("fmi3FreeInstance")?,
+            enter_initialization: l.symbol("fmi3EnterInitializationMode")?,
+            exit_initialization: l.symbol("fmi3ExitInitializationMode")?,
+            terminate: l.symbol("fmi3Terminate")?,
+            reset: l.symbol("fmi3Reset")?,
+            do_step: l.symbol("fmi3DoStep")?,
+            get_float64: l.symbol("fmi3GetFloat64")?,
+            get_int64: l.symbol("fmi3GetInt64")?,
+            set_float64: l.symbol("fmi3SetFloat64")?,
+            set_int32: l.symbol("fmi3SetInt32")?,
+            set_int64: l.symbol("fmi3SetInt64")?,
+            set_boolean: l.symbol("fmi3SetBoolean")?,
+            set_string: l.symbol("fmi3SetString")?,
         };
-        let instantiate: Instantiate = symbol(l, "fmi3InstantiateCoSimulation")?;
+        let instantiate: InstantiateCoSimulation = l.symbol("fmi3InstantiateCoSimulation")?;
         let token = CString::new(token)?;
         let resources = resources.map(CString::new).transpose()?;
         let log = Box::<Log>::default();
@@ -212,10 +111,10 @@ impl Fmi {
                 c"instance".as_ptr(),
                 token.as_ptr(),
                 resources.as_ref().map_or(std::ptr::null(), |r| r.as_ptr()),
-                false,
-                true,
-                false,
-                false,
+                0,
+                1,
+                0,
+                0,
                 std::ptr::null(),
                 0,
                 std::ptr::from_ref::<Log>(&log).cast_mut().cast(),
@@ -224,14 +123,14 @@ impl Fmi {
             )
         };
         if instance.is_null() {
-            return Err(LoadError::Refused { messages: log.messages.take() });
+            return Err(LoadError::Refused { messages: log.texts() });
         }
-        Ok(Self { instance, f, log, _library: library })
+        Ok(Self { instance, f, log, _library: l })
     }
 
     /// What the FMU has said so far.
     pub(crate) fn messages(&self) -> Vec<String> {
-        self.log.messages.borrow().clone()
+        self.log.texts()
     }
 
     /// Sets start values one by one, in their order.
@@ -241,7 +140,9 @@ impl Fmi {
                 Value::Float64(value) => self.set_one("fmi3SetFloat64", self.f.set_float64, *vr, value),
                 Value::Int32(value) => self.set_one("fmi3SetInt32", self.f.set_int32, *vr, value),
                 Value::Int64(value) => self.set_one("fmi3SetInt64", self.f.set_int64, *vr, value),
-                Value::Boolean(value) => self.set_one("fmi3SetBoolean", self.f.set_boolean, *vr, value),
+                Value::Boolean(value) => {
+                    self.set_one("fmi3SetBoolean", self.f.set_boolean, *vr, &u8::from(*value))
+                }
                 Value::String(value) => {
                     self.set_one("fmi3SetString", self.f.set_string, *vr, &value.as_ptr())
                 }
@@ -258,7 +159,7 @@ impl Fmi {
     /// Initialisation mode in and out.
     pub(crate) fn initialise(&self, start: f64, stop: f64) -> Result<(), Fault> {
         // SAFETY: the instance is live.
-        let status = unsafe { (self.f.enter_initialization)(self.instance, false, 0.0, start, true, stop) };
+        let status = unsafe { (self.f.enter_initialization)(self.instance, 0, 0.0, start, 1, stop) };
         check("fmi3EnterInitializationMode", status, Some(start))?;
         self.simple("fmi3ExitInitializationMode", self.f.exit_initialization, Some(start))
     }
@@ -287,7 +188,7 @@ impl Fmi {
                 self.instance,
                 t,
                 step,
-                true,
+                1,
                 &raw mut event,
                 &raw mut terminate,
                 &raw mut early,

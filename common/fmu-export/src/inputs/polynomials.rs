@@ -108,8 +108,9 @@ impl Polynomials {
             let [d_0, d_1, d_2] = self.nodes.map(|node| to - node);
             let change = d_0 * (c[1] + d_1 * (c[2] + d_2 * c[3]));
             let largest = c[0].abs().max(last.abs()).max(b.nominal);
-            let outside = c[0] + change < b.min || c[0] + change > b.max;
-            if outside || limit > 0.0 && change.abs() > limit * largest {
+            let end = c[0] + change;
+            let inside = end.is_finite() && end >= b.min && end <= b.max;
+            if !inside || limit > 0.0 && change.abs() > limit * largest {
                 return;
             }
         }
