@@ -76,6 +76,24 @@ def test_coupled(tmp_path, fmu, name, method, order):
     same(native(tmp_path, name, *options, *inner), twin)
 
 
+# a bump whose ends lie inside the steps: time events
+BUMP = {"force.pulse.amplitude.z": 20.0, "force.pulse.start": 0.1234, "force.pulse.duration": 0.2}
+
+
+@pytest.mark.parametrize("options", [("common", "rk4", 1), ("cs-predict", None, 1), ("cs-pece", None, 2)], ids=lambda o: o[0])
+def test_time_events(tmp_path, fmu, options):
+    method, integrator, order = options
+    scene = library.scene("double_wishbone", fmu)
+    scene.set("load", **BUMP)
+    H = 5e-3
+    settings = {"method": method, "H": H, "stop": 1.0} | ({"integrator": integrator} if integrator else {"order": order})
+    twin = scene.run(**settings, values={} if integrator else scenes.fixed("rk4", H))
+    command = ["--method", method, "--order", str(order), "--H", str(H), "--stop", "1"]
+    command += ["--integrator", integrator] if integrator else ["--set", "*.solver.method=rk4", "--set", f"*.solver.step={H}"]
+    command += [part for name, value in BUMP.items() for part in ("--set", f"load.{name}={value}")]
+    same(native(tmp_path, "double_wishbone", *command), twin)
+
+
 def test_adaptive_runs_agree_to_their_tolerance(tmp_path, fmu):
     options = {"rtol": 1e-10, "atol": 1e-12}
     twin = library.scene("double_pendulum", fmu).run(method="common", integrator="dopri5", **options)

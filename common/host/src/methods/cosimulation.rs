@@ -21,6 +21,8 @@ use crate::sweep::Sweeper;
 
 /// First step of a controlled run, relative to its length.
 const FIRST_STEP: f64 = 1e-3;
+/// Times that differ by less than this part of a step are one.
+const SAME_TIME: f64 = 1e-9;
 /// Smallest step, relative to the length of the run.
 const LEAST_STEP: f64 = 1e-10;
 
@@ -45,6 +47,8 @@ pub(super) fn run(
         steps: Steps::default(),
         step: config.step.unwrap_or(FIRST_STEP * (config.stop - config.start)),
         grid: 0,
+        next_event: None,
+        event_wanted: false,
         sweeper,
     };
     run.update()?;
@@ -90,6 +94,10 @@ struct Run<'a> {
     step: f64,
     /// Points of a fixed grid so far
     grid: u64,
+    /// Next time event [s]
+    next_event: Option<f64>,
+    /// A component asked for Event Mode in the last step
+    event_wanted: bool,
     saved: Vec<Option<Saved>>,
     /// Inputs at the end of the predicted step
     kept: Vec<f64>,
@@ -101,7 +109,16 @@ struct Run<'a> {
 impl Run<'_> {
     /// In Event Mode at an accepted point.
     fn update(&mut self) -> Result<(), RunError> {
-        events::update(self.sweeper)?;
+        if self.event_wanted {
+            self.steps.events += 1;
+            self.inputs.announce(self.sweeper)?;
+        }
+        let mut happened = events::update(self.sweeper)?;
+        if happened.states_changed {
+            self.inputs.announce(self.sweeper)?;
+            happened = events::update(self.sweeper)?;
+        }
+        self.next_event = happened.next;
         // outputs of sampled FMUs are visible at once
         if self.sweeper.sampled { self.sweeper.sweep() } else { Ok(()) }
     }
@@ -120,20 +137,41 @@ impl Run<'_> {
         Ok(())
     }
 
+    /// End of a step on the fixed grid, or the time event before it.
     fn next_grid_point(&mut self) -> f64 {
-        self.grid += 1;
-        self.config.point(self.grid, self.step)
+        let point = self.config.point(self.grid + 1, self.step);
+        let end = self.up_to_event(point);
+        if end >= point - SAME_TIME * self.step {
+            self.grid += 1;
+        }
+        end
+    }
+
+    /// Time events are communication points; one that differs from `end` in its last digits takes its place.
+    fn up_to_event(&self, end: f64) -> f64 {
+        let near = SAME_TIME * (end - self.t);
+        match self.next_event {
+            Some(event) if event > self.t + near && event < end - near => event,
+            Some(event) if (event - end).abs() <= near && (event > end || end < self.config.stop) => event,
+            _ => end,
+        }
     }
 
     /// From Event Mode over Step Mode to Event Mode at `end`; `with_kept`: with the inputs kept from the predicted end.
     fn step_to_event_mode(&mut self, end: f64, with_kept: bool, may_restore: bool) -> Result<(), RunError> {
-        let Self { sweeper, kept, t, .. } = self;
-        let h = end - *t;
+        let Self { sweeper, kept, t, event_wanted, .. } = self;
+        let mut h = end - *t;
+        if *t + h < end {
+            h = h.next_up(); // as the components add it, an event at the end lies inside the step
+        }
         sweeper.each(|_, instance| instance.enter_step_mode())?;
         if with_kept {
             sweeper.set_inputs(kept)?;
         }
-        (0..sweeper.instances.len()).try_for_each(|node| do_step(sweeper, node, *t, h, may_restore))?;
+        *event_wanted = false;
+        for node in 0..sweeper.instances.len() {
+            *event_wanted |= do_step(sweeper, node, *t, h, may_restore)?;
+        }
         *t = end;
         sweeper.t = end;
         sweeper.invalidate();
@@ -147,7 +185,11 @@ impl Run<'_> {
         let start = self.t;
         let order = self.config.order;
         loop {
-            let end = if self.config.step.is_some() { self.next_grid_point() } else { self.reach(recorder) };
+            let end = if self.config.step.is_some() {
+                self.next_grid_point()
+            } else {
+                self.up_to_event(self.reach(recorder))
+            };
             let h = end - start;
             self.inputs.set_all(self.sweeper, Treatment::Extrapolate, order)?;
             self.step_to_event_mode(end, false, true)?;

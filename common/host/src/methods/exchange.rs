@@ -63,20 +63,20 @@ fn treat_inputs(sweeper: &mut Sweeper, config: &Config) -> Result<(), RunError> 
     Ok(())
 }
 
-/// One step of one component.
+/// One step of one component; whether it wants Event Mode.
 pub(super) fn do_step(
     sweeper: &mut Sweeper,
     node: usize,
     t: f64,
     h: f64,
     may_restore: bool,
-) -> Result<(), RunError> {
+) -> Result<bool, RunError> {
     let stepped = sweeper.instances[node].do_step(t, h, may_restore);
     let stepped = stepped.map_err(|fault| sweeper.failed(node, fault))?;
     if stepped.terminate {
         return Err(sweeper.failed(node, Fault { function: "DoStep", status: Status::Terminate }));
     }
-    Ok(())
+    Ok(stepped.event)
 }
 
 fn jacobi(sweeper: &mut Sweeper, t: f64, h: f64, exchange: bool) -> Result<(), RunError> {
@@ -85,7 +85,7 @@ fn jacobi(sweeper: &mut Sweeper, t: f64, h: f64, exchange: bool) -> Result<(), R
         nodes.clone().try_for_each(|node| sweeper.take(node))?;
         nodes.clone().try_for_each(|node| sweeper.give(node))?;
     }
-    nodes.clone().try_for_each(|node| do_step(sweeper, node, t, h, false))
+    nodes.clone().try_for_each(|node| do_step(sweeper, node, t, h, false).map(|_| ()))
 }
 
 fn seidel(sweeper: &mut Sweeper, t: f64, h: f64) -> Result<(), RunError> {

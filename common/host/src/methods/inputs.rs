@@ -1,7 +1,7 @@
 //! How our FMUs treat their inputs inside a step: `port.inputs`, `port.order`.
 
 use crate::error::RunError;
-use crate::import::{Value, VariableKind};
+use crate::import::{Instance, Value, VariableKind};
 use crate::sweep::Sweeper;
 
 /// Values of `port.inputs`.
@@ -23,6 +23,9 @@ struct Parameters {
 /// The parameters of all components.
 pub(super) struct Inputs {
     parameters: Vec<Parameters>,
+    /// References of `port.reset`
+    resets: Vec<Option<u32>>,
+    announced: f64,
 }
 
 impl Inputs {
@@ -37,7 +40,23 @@ impl Inputs {
                 order: find("port.order", VariableKind::Int32),
             }
         });
-        Self { parameters: parameters.collect() }
+        let reset =
+            |instance: &Instance| instance.fmu().description.variable("port.reset").map(|v| v.reference);
+        Self {
+            parameters: parameters.collect(),
+            resets: sweeper.instances.iter().map(reset).collect(),
+            announced: 0.0,
+        }
+    }
+
+    /// Announces a discontinuity: a new value of `port.reset` lets the components forget the samples of their inputs.
+    pub(super) fn announce(&mut self, sweeper: &mut Sweeper) -> Result<(), RunError> {
+        self.announced += 1.0;
+        let (resets, value) = (&self.resets, self.announced);
+        sweeper.each(|node, instance| match resets[node] {
+            Some(reference) => instance.set(&[reference], &[value]),
+            None => Ok(()),
+        })
     }
 
     /// Sets one component.
