@@ -1,11 +1,15 @@
 //! The sweep: one Set and one Get per component and pass, closing joints and affine loops solved in between.
 
+mod ports;
+
+pub use ports::Port;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::closure::Closure;
 use crate::error::RunError;
 use crate::import::{Counts, Fault, Instance};
-use crate::scene::{Axis, Network, Plan, Source, Step};
+use crate::scene::{Axis, Network, Plan, Step};
 
 /// No index.
 const NONE: usize = usize::MAX;
@@ -31,22 +35,6 @@ struct Call {
     sinks: Box<[usize]>,
     signals: Box<[usize]>,
     references: Box<[u32]>,
-}
-
-/// What one component gives and takes, for a plain exchange.
-pub struct Port {
-    /// Signals it gives
-    pub signals: Vec<usize>,
-    /// Their value references
-    pub outputs: Vec<u32>,
-    /// Inputs it takes, by index
-    pub sinks: Vec<usize>,
-    /// Their value references
-    pub inputs: Vec<u32>,
-    /// Where their values come from
-    sources: Vec<Option<Source>>,
-    /// It follows the motion of others
-    pub follows: bool,
 }
 
 /// Columns that use the same calls.
@@ -166,7 +154,7 @@ impl Sweeper {
         Self {
             names: network.nodes.iter().map(|n| n.name.clone()).collect(),
             values: vec![0.0; network.signals.len()],
-            ports: ports(network),
+            ports: ports::of(network),
             order: network.leaders_first(),
             motion: (0..network.signals.len()).filter(|&s| network.is_motion(s)).collect(),
             sampled: (0..network.signals.len()).any(|s| network.is_discrete(s)),
@@ -241,62 +229,6 @@ impl Sweeper {
     #[must_use]
     pub fn signal_name(&self, signal: usize) -> &str {
         &self.signal_names[signal]
-    }
-
-    /// Inputs that the FMUs hold after a sweep.
-    #[must_use]
-    pub fn held(&self) -> &[f64] {
-        &self.held
-    }
-
-    /// Sets all connected inputs to values kept from [`held`](Self::held).
-    ///
-    /// # Errors
-    /// A call that fails.
-    pub fn set_inputs(&mut self, values: &[f64]) -> Result<(), RunError> {
-        for node in 0..self.ports.len() {
-            self.scratch.clear();
-            self.scratch.extend(self.ports[node].sinks.iter().map(|&sink| values[sink]));
-            self.push(node)?;
-        }
-        Ok(())
-    }
-
-    /// Reads all signals of a component.
-    ///
-    /// # Errors
-    /// A call that fails.
-    pub fn take(&mut self, node: usize) -> Result<(), RunError> {
-        let port = &self.ports[node];
-        if port.signals.is_empty() {
-            return Ok(());
-        }
-        self.scratch.resize(port.signals.len(), 0.0);
-        let result = self.instances[node].get(&port.outputs, &mut self.scratch);
-        for (&signal, &value) in port.signals.iter().zip(&self.scratch) {
-            self.values[signal] = value;
-        }
-        result.map_err(|fault| self.failed(node, fault))
-    }
-
-    /// Sets all inputs of a component from the signals as they are.
-    ///
-    /// # Errors
-    /// A call that fails.
-    pub fn give(&mut self, node: usize) -> Result<(), RunError> {
-        let values = &self.values;
-        let value = |source: &Option<Source>| source.map_or(0.0, |s| s.factor * values[s.signal] + s.offset);
-        self.scratch.clear();
-        self.scratch.extend(self.ports[node].sources.iter().map(value));
-        self.push(node)
-    }
-
-    fn push(&mut self, node: usize) -> Result<(), RunError> {
-        if self.scratch.is_empty() {
-            return Ok(());
-        }
-        let result = self.instances[node].set(&self.ports[node].inputs, &self.scratch);
-        result.map_err(|fault| self.failed(node, fault))
     }
 
     #[inline]
@@ -542,23 +474,4 @@ fn pattern(plan: &Plan, n: usize) -> Vec<usize> {
         }
     }
     first
-}
-
-fn ports(network: &Network) -> Vec<Port> {
-    let port = |node: usize| {
-        let signals: Vec<usize> =
-            (0..network.signals.len()).filter(|&s| network.signals[s].node == node).collect();
-        let sinks: Vec<usize> = (0..network.sinks.len()).filter(|&s| network.sinks[s].node == node).collect();
-        Port {
-            outputs: signals.iter().map(|&s| network.signals[s].reference).collect(),
-            inputs: sinks.iter().map(|&s| network.sinks[s].reference).collect(),
-            sources: sinks.iter().map(|&s| network.sinks[s].source).collect(),
-            follows: sinks
-                .iter()
-                .any(|&s| network.sinks[s].source.is_some_and(|source| network.is_motion(source.signal))),
-            signals,
-            sinks,
-        }
-    };
-    (0..network.nodes.len()).map(port).collect()
 }
