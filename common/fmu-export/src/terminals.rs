@@ -1,4 +1,5 @@
-//! `terminalsAndIcons.xml`: the ports of the variable table, so that a host can connect one at once.
+//! `terminalsAndIcons.xml`: the place of the icon, and the ports of the variable table, so that a host can connect one
+//! at once.
 //!
 //! | port | has | terminal kind |
 //! | --- | --- | --- |
@@ -21,7 +22,7 @@ use crate::table::{Table, Variable};
 
 /// Kind of a port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Port {
+pub(crate) enum Port {
     Leader,
     Follower,
     Force,
@@ -36,7 +37,7 @@ impl Port {
         }
     }
 
-    const fn description(self) -> &'static str {
+    pub(crate) const fn description(self) -> &'static str {
         match self {
             Self::Leader => "Gives motion, takes force and inertia",
             Self::Follower => "Takes motion, gives force and inertia",
@@ -59,7 +60,7 @@ impl Port {
 const QUANTITIES: [&str; 7] = ["r", "s", "v", "a", "F", "F0", "M"];
 
 /// Port, quantity and component of `P.F0.x`; none for other variables.
-fn parts(name: &str) -> Option<(&str, &str, &str)> {
+pub(crate) fn parts(name: &str) -> Option<(&str, &str, &str)> {
     let mut found = None;
     for quantity in QUANTITIES {
         for (at, dotted) in name.match_indices('.') {
@@ -110,22 +111,46 @@ fn members(xml: &mut Xml, variables: &[Variable], name: &str, port: Port) -> io:
     Ok(())
 }
 
-/// The file, or none without ports.
+/// Names before a port's quantities: ports and slots.
+fn names(variables: &[Variable]) -> BTreeSet<&str> {
+    variables.iter().filter_map(|v| parts(&v.name)).map(|(p, ..)| p).collect()
+}
+
+/// The ports by name.
+pub(crate) fn ports(variables: &[Variable]) -> Vec<(&str, Port)> {
+    names(variables).into_iter().filter_map(|name| Some((name, port(variables, name)?))).collect()
+}
+
+/// Place of the icon: it fills the square of the coordinate system.
+fn representation(xml: &mut Xml) -> io::Result<()> {
+    const CORNERS: [(&str, &str); 4] = [("x1", "-100"), ("y1", "-100"), ("x2", "100"), ("y2", "100")];
+    xml.create_element("GraphicalRepresentation").write_inner_content(|xml| {
+        xml.create_element("CoordinateSystem")
+            .with_attributes(CORNERS)
+            .with_attribute(("suggestedScalingFactorTo_mm", "0.1"))
+            .write_empty()?;
+        xml.create_element("Icon").with_attributes(CORNERS).write_empty()?;
+        Ok(())
+    })?;
+    Ok(())
+}
+
+/// The file.
 ///
 /// # Errors
 /// None that are known: writing goes to memory.
-pub(crate) fn terminals<M: Model>() -> io::Result<Option<Vec<u8>>> {
+pub(crate) fn terminals<M: Model>() -> io::Result<Vec<u8>> {
     let table = Table::new::<M>();
     let variables = table.variables();
-    let names: BTreeSet<_> = variables.iter().filter_map(|v| parts(&v.name)).map(|(p, ..)| p).collect();
-    let ports: Vec<_> = names.iter().filter_map(|name| Some((*name, port(variables, name)?))).collect();
-    if ports.is_empty() {
-        return Ok(None);
-    }
+    let (names, ports) = (names(variables), ports(variables));
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
     xml.create_element("fmiTerminalsAndIcons").with_attribute(("fmiVersion", "3.0")).write_inner_content(
         |xml| {
+            representation(xml)?;
+            if ports.is_empty() {
+                return Ok(());
+            }
             xml.create_element("Terminals").write_inner_content(|xml| {
                 for (name, port) in &ports {
                     terminal(xml, variables, name, *port, &names)?;
@@ -136,7 +161,7 @@ pub(crate) fn terminals<M: Model>() -> io::Result<Option<Vec<u8>>> {
         },
     )?;
     xml.write_event(Event::Text(BytesText::new("\n")))?;
-    Ok(Some(xml.into_inner()))
+    Ok(xml.into_inner())
 }
 
 /// One terminal with its further slots.

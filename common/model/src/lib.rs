@@ -16,12 +16,14 @@
 #![forbid(unsafe_code)]
 #![allow(non_snake_case, reason = "port letters")]
 
+mod documentation;
 mod error;
 mod jacobian;
 mod leaf;
 mod system;
 mod variable;
 
+pub use documentation::{Documentation, Plot};
 pub use error::{EvaluationError, ParameterError};
 pub use jacobian::{Dense, Spectrum, directional, state_jacobian};
 pub use leaf::{NoVariables, SymmetricTensor, Vector3};
