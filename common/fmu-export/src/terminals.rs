@@ -7,6 +7,9 @@
 //! | follower | inputs `P.r`, `P.v`, `P.a`; outputs `P.F`, `P.F0`, `P.M` | `org.koppel.port.follower` |
 //! | force | inputs `P.r`, `P.v`, no `P.a`: a follower without inertia | `org.koppel.port.force` |
 //!
+//! A follower whose force is not affine in the acceleration has `.not_affine` after its kind, a leader that is known at
+//! samples only `.sampled` (fields marked so in the variable table): such a leader takes no inertia.
+//!
 //! Members with the same name belong together. That is the inertial connection: the follower's `P.F0` meets the
 //! leader's `P.F` as member `F`, `M` meets `M`; the follower's true force is the member `force`, which no leader has.
 //! Hence the matching rule `bus`.
@@ -14,7 +17,7 @@
 use std::collections::BTreeSet;
 use std::io;
 
-use model::{Causality, Model};
+use model::{Causality, Model, PortLaw};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
 
@@ -53,6 +56,17 @@ impl Port {
             (_, "F") => "force",
             (_, other) => other,
         }
+    }
+}
+
+/// What comes after the kind of the port `name`.
+fn mark(variables: &[Variable], name: &str) -> &'static str {
+    let of_port = |v: &&Variable| parts(&v.name).is_some_and(|(p, ..)| p == name);
+    let laws = variables.iter().filter(of_port).map(|v| v.entry.port);
+    match laws.into_iter().find(|law| *law != PortLaw::Regular) {
+        Some(PortLaw::NotAffine) => ".not_affine",
+        Some(PortLaw::Sampled) => ".sampled",
+        Some(PortLaw::Regular) | None => "",
     }
 }
 
@@ -172,7 +186,8 @@ fn terminal(
     port: Port,
     names: &BTreeSet<&str>,
 ) -> io::Result<()> {
-    let attributes = [("name", name), ("matchingRule", "bus"), ("terminalKind", port.kind())];
+    let kind = format!("{}{}", port.kind(), mark(variables, name));
+    let attributes = [("name", name), ("matchingRule", "bus"), ("terminalKind", &kind)];
     xml.create_element("Terminal")
         .with_attributes(attributes)
         .with_attribute(("description", port.description()))
@@ -193,6 +208,8 @@ fn terminal(
 
 #[cfg(test)]
 mod tests {
+    use model::{Entry, Kind};
+
     use super::*;
 
     #[test]
@@ -203,5 +220,20 @@ mod tests {
         for other in ["chassis.a.x", "loop.gap", "P", "strut.force", "angle.theta", "der(P.r.x)"] {
             assert_eq!(parts(other), None, "{other}");
         }
+    }
+
+    #[test]
+    fn ports_are_marked_by_their_variables() {
+        let variable = |name: &str, law| {
+            let mut entry = Entry::scalar("", Kind::Float64);
+            entry.port = law;
+            Variable { name: name.into(), entry, derivative_of: None }
+        };
+        let variables = [
+            variable("A.a.x", PortLaw::NotAffine),
+            variable("P.r.x", PortLaw::Regular),
+            variable("V.s", PortLaw::Sampled),
+        ];
+        assert_eq!(["A", "P", "V"].map(|name| mark(&variables, name)), [".not_affine", "", ".sampled"]);
     }
 }
