@@ -28,6 +28,9 @@ impl<M: Model> Instance<M> {
     /// # Errors
     /// In Model Exchange, where the event indicators have no value.
     pub fn enter_event_mode(&mut self) -> Result<(), Fault> {
+        if self.state.phase == Phase::EventMode {
+            return Ok(()); // FMI 2.0 allows it there; what has crossed is known already
+        }
         if self.state.interface.is_model_exchange() && !M::INDICATORS.is_empty() {
             self.refresh(Part::Indicators.bit())?;
             let State { sides, values, .. } = &self.state;

@@ -100,13 +100,15 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// Typical magnitudes of all continuous states.
+    /// Typical magnitudes of all continuous states; before initialisation those that are declared.
     ///
     /// # Errors
     /// A wrong number of values; before the end of initialisation, parameters that do not fit together.
     pub fn get_nominals(&mut self, nominals: &mut [f64]) -> Result<(), Fault> {
         same_length(self.state_count(), nominals.len())?;
-        self.tuned()?;
+        if self.state.phase != Phase::Instantiated {
+            self.tuned()?;
+        }
         for (nominal, state) in nominals.iter_mut().zip(&self.table.states) {
             *nominal = self.table.variables[*state].entry.nominal;
         }

@@ -25,10 +25,8 @@ pub enum Status {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Fault {
     /// Function called in the wrong phase.
-    #[error("{function} may not be called in {phase}; allowed in: {allowed}")]
+    #[error("may not be called in {phase}; allowed in: {allowed}")]
     WrongPhase {
-        /// Function
-        function: &'static str,
         /// Phase of the instance
         phase: String,
         /// Phases in which it may be called
@@ -103,12 +101,18 @@ pub enum Fault {
         values: usize,
     },
     /// Function without effect in this FMU.
-    #[error("{function} is not supported: {reason}")]
+    #[error("not supported: {reason}")]
     Unsupported {
-        /// Function
-        function: &'static str,
         /// Why
         reason: &'static str,
+    },
+    /// A log category that is not declared.
+    #[error("\"{name}\" is no log category; declared: {declared}")]
+    LogCategory {
+        /// What was asked for
+        name: String,
+        /// Those of the model description
+        declared: String,
     },
     /// An argument of a call that makes no sense.
     #[error("{argument} = {value}; allowed: {allowed}")]

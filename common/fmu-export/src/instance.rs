@@ -88,7 +88,6 @@ impl<M: Model> Instance<M> {
             return Ok(());
         }
         Err(Fault::WrongPhase {
-            function: rule.function,
             phase: format!("{phase:?} of {interface}"),
             allowed: rule.allowed(interface),
         })

@@ -3,8 +3,8 @@
 use std::cell::RefCell;
 
 use integrators::{
-    Complex, Indicators, Jacobian, Method, Ode, Reached, Solver, Statistics, StepError, largest_stable_step,
-    violates,
+    Complex, Indicators, Jacobian, MAX_EVALUATIONS, Method, Ode, Reached, Solver, Statistics, StepError,
+    largest_stable_step, violates,
 };
 use model::Matrix;
 use model::{
@@ -353,7 +353,12 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
             d: *self.d,
         };
         let mut t = from;
+        let most_work = statistics.work(N) + MAX_EVALUATIONS;
         loop {
+            if statistics.work(N) > most_work {
+                // many events, each cheap
+                return Err(fault(StepError::TooMuchWork { t, t_end: to, h: solver.memory().step }));
+            }
             if t < to || !self.leave_events {
                 driven.pass_events(t, &mut x, &mut solver);
             }

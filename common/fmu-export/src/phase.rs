@@ -183,12 +183,15 @@ pub(crate) mod fmi3 {
 
 /// The functions of FMI 2.0.
 pub(crate) mod fmi2 {
-    use super::Phase::{ContinuousTimeMode, EventMode, InitializationMode, Instantiated, StepMode};
+    use super::Phase::{
+        ContinuousTimeMode, EventMode, InitializationMode, Instantiated, StepMode, Terminated,
+    };
     use super::{ANY, CoSimulation2, ModelExchange2, RUNNING, Rule, SETTABLE, TERMINABLE};
 
     const CS: u8 = CoSimulation2 as u8;
     const ME: u8 = ModelExchange2 as u8;
     const FMI2: u8 = CS | ME;
+    const STEPPED: u8 = StepMode as u8 | Terminated as u8;
 
     rules! {
         SET_DEBUG_LOGGING "fmi2SetDebugLogging" FMI2 ANY;
@@ -213,26 +216,32 @@ pub(crate) mod fmi2 {
         SERIALISE "fmi2SerializeFMUstate" FMI2 ANY;
         DESERIALISE "fmi2DeSerializeFMUstate" FMI2 ANY;
         DIRECTIONAL_DERIVATIVE "fmi2GetDirectionalDerivative" FMI2 RUNNING;
-        ENTER_EVENT_MODE "fmi2EnterEventMode" ME ContinuousTimeMode as u8;
+        ENTER_EVENT_MODE "fmi2EnterEventMode" ME EventMode as u8 | ContinuousTimeMode as u8;
         NEW_DISCRETE_STATES "fmi2NewDiscreteStates" ME EventMode as u8;
         ENTER_CONTINUOUS_TIME_MODE "fmi2EnterContinuousTimeMode" ME EventMode as u8;
         COMPLETED_INTEGRATOR_STEP "fmi2CompletedIntegratorStep" ME ContinuousTimeMode as u8;
-        SET_TIME "fmi2SetTime" ME EventMode as u8 | ContinuousTimeMode as u8;
+        SET_TIME "fmi2SetTime" ME ContinuousTimeMode as u8;
         SET_CONTINUOUS_STATES "fmi2SetContinuousStates" ME ContinuousTimeMode as u8;
         GET_DERIVATIVES "fmi2GetDerivatives" ME RUNNING;
         GET_INDICATORS "fmi2GetEventIndicators" ME RUNNING;
         GET_CONTINUOUS_STATES "fmi2GetContinuousStates" ME RUNNING;
-        GET_NOMINALS "fmi2GetNominalsOfContinuousStates" ME RUNNING;
-        GET_STATUS "fmi2GetStatus" CS RUNNING;
-        GET_REAL_STATUS "fmi2GetRealStatus" CS RUNNING;
-        GET_INTEGER_STATUS "fmi2GetIntegerStatus" CS RUNNING;
-        GET_BOOLEAN_STATUS "fmi2GetBooleanStatus" CS RUNNING;
-        GET_STRING_STATUS "fmi2GetStringStatus" CS RUNNING;
+        GET_NOMINALS "fmi2GetNominalsOfContinuousStates" ME ANY;
+        GET_STATUS "fmi2GetStatus" CS STEPPED;
+        GET_REAL_STATUS "fmi2GetRealStatus" CS STEPPED;
+        GET_INTEGER_STATUS "fmi2GetIntegerStatus" CS STEPPED;
+        GET_BOOLEAN_STATUS "fmi2GetBooleanStatus" CS STEPPED;
+        GET_STRING_STATUS "fmi2GetStringStatus" CS STEPPED;
         UNSUPPORTED "" FMI2 ANY;
     }
 }
 
 impl Rule {
+    /// The same rule for the function of this name.
+    #[must_use]
+    pub const fn named(&self, function: &'static str) -> Self {
+        Self { function, ..*self }
+    }
+
     /// True if the function may be called in `phase`.
     #[inline]
     #[must_use]
@@ -294,13 +303,13 @@ mod tests {
             (fmi2::EXIT_INITIALIZATION, "InitializationMode", "InitializationMode"),
             (fmi2::TERMINATE, "StepMode", "EventMode, ContinuousTimeMode"),
             (fmi2::DO_STEP, "StepMode", cs),
-            (fmi2::GET_REAL_STATUS, "InitializationMode, StepMode, Terminated", cs),
+            (fmi2::GET_REAL_STATUS, "StepMode, Terminated", cs),
             (fmi2::GET_REAL, "InitializationMode, StepMode, Terminated", in_a_run),
-            (fmi2::ENTER_EVENT_MODE, me, "ContinuousTimeMode"),
+            (fmi2::ENTER_EVENT_MODE, me, "EventMode, ContinuousTimeMode"),
             (fmi2::NEW_DISCRETE_STATES, me, "EventMode"),
             (fmi2::ENTER_CONTINUOUS_TIME_MODE, me, "EventMode"),
             (fmi2::COMPLETED_INTEGRATOR_STEP, me, "ContinuousTimeMode"),
-            (fmi2::SET_TIME, me, "EventMode, ContinuousTimeMode"),
+            (fmi2::SET_TIME, me, "ContinuousTimeMode"),
             (fmi2::SET_CONTINUOUS_STATES, me, "ContinuousTimeMode"),
             (fmi2::GET_DERIVATIVES, me, in_a_run),
         ] {

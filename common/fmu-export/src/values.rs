@@ -1,6 +1,6 @@
 //! Get and Set: values by reference, all or none.
 
-use model::{Causality, Entry, Kind, Model, Variability};
+use model::{Causality, Entry, Initial, Kind, Model, Variability};
 
 use crate::phase::{Interface, Phase};
 use crate::state::State;
@@ -99,7 +99,8 @@ impl<M: Model> Instance<M> {
             if !is(entry.kind) {
                 return Err(self.wrong_type(*reference, called));
             }
-            if let Some(reason) = self.not_settable(entry) {
+            let by_host = self.is_state_of_host(*reference);
+            if !by_host && let Some(reason) = self.not_settable(entry) {
                 let phase = format!("{:?}", self.state.phase);
                 return Err(Fault::NotSettable { variable: name.clone(), phase, reason });
             }
@@ -119,8 +120,28 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
+    /// A state that the host integrates now (FMI 3.0, 3.2.1; FMI 2.0.5, 3.2.3).
+    fn is_state_of_host(&self, reference: u32) -> bool {
+        self.state.phase == Phase::ContinuousTimeMode && self.table.is_state(reference as usize)
+    }
+
+    /// One state, as [`set_continuous_states`](Self::set_continuous_states) sets all: one that is not used keeps its value.
+    fn accept_state(&mut self, reference: usize, value: f64) {
+        let State { x, places, fresh, .. } = &mut self.state;
+        let used = places.iter().position(|place| self.table.states[*place] == reference);
+        if let Some(x) = used.and_then(|i| x.get_mut(i))
+            && x.to_bits() != value.to_bits()
+        {
+            *x = value;
+            *fresh = 0;
+        }
+    }
+
     /// Take over a value that may be set; what depends on it is out of date.
     fn accept(&mut self, i: usize, value: f64) {
+        if self.state.phase == Phase::ContinuousTimeMode && self.table.is_state(i) {
+            return self.accept_state(i, value);
+        }
         let State { values, given, history, motion_start, model, fresh, retune, phase, .. } = &mut self.state;
         if Layout::<M>::INPUTS.contains(&i) {
             let given = &mut given[i - Layout::<M>::INPUTS.start];
@@ -156,11 +177,14 @@ impl<M: Model> Instance<M> {
             Phase::Instantiated | Phase::InitializationMode if !entry.has_start() => {
                 Some("it is computed and has no start value")
             }
+            Phase::InitializationMode if entry.initial == Initial::Approx => {
+                Some("its start value is a guess (initial = approx); set it before Initialization Mode")
+            }
             Phase::StepMode | Phase::EventMode | Phase::ContinuousTimeMode if !changes_in_a_run(entry) => {
                 Some("only inputs and tunable parameters change in a run")
             }
             Phase::ContinuousTimeMode if !continuous_input => {
-                Some("only continuous inputs change between events; set it in Event Mode")
+                Some("only continuous inputs and states change between events; set it in Event Mode")
             }
             Phase::StepMode if interface == Interface::CoSimulationWithEvents && !continuous_input => {
                 Some("only continuous inputs change between steps where Event Mode is used; set it there")

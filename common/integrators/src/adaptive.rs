@@ -6,7 +6,7 @@ use crate::error::all_finite;
 use crate::first_step;
 use crate::one_step::{Call, OneStep, Start};
 use crate::pace::{LEAST_ERROR, RESOLUTION, SAFETY, SHRINK, Taken, fit};
-use crate::run::{MAX_STEPS, Run, Watch};
+use crate::run::{MAX_EVALUATIONS, Run, Watch};
 use crate::solver::Memory;
 use crate::{Dense, Ode, StepError};
 
@@ -23,11 +23,11 @@ pub(crate) fn adaptive<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
     t_end: f64,
     watch: &mut W,
 ) -> Result<(), StepError<O::Error>> {
-    let control = Control { method, t_end, watched: W::WATCHES };
+    let most_work = call.statistics.work(N) + MAX_EVALUATIONS;
+    let control = Control { method, t_end, most_work, watched: W::WATCHES };
     let pace = method.pace();
     let mut slope = None;
     let mut before = None;
-    let mut trials = 0;
     while run.t < t_end {
         let from = run.start(call, slope.take())?;
         all_finite(from.t, &from.slope)?;
@@ -39,7 +39,7 @@ pub(crate) fn adaptive<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
         method.begin(call, &from)?;
         let first = before.is_none();
         let Accepted { trial, now, rejected, dense } =
-            control.accepted(call, &from, fit(wanted, remaining), first, &mut trials)?;
+            control.accepted(call, &from, fit(wanted, remaining), first)?;
 
         let h = now.h;
         let last = h >= remaining;
@@ -83,6 +83,8 @@ struct Accepted<T, const N: usize> {
 struct Control<'a, M> {
     method: &'a M,
     t_end: f64,
+    /// The work at which the call is given up
+    most_work: u64,
     watched: bool,
 }
 
@@ -100,7 +102,6 @@ impl<M> Control<'_, M> {
         from: &Start<N>,
         mut h: f64,
         first: bool,
-        trials: &mut u32,
     ) -> Result<Accepted<M::Trial, N>, StepError<O::Error>>
     where
         M: OneStep<N>,
@@ -110,9 +111,8 @@ impl<M> Control<'_, M> {
         let min = self.least_step(t);
         let mut rejected = false;
         loop {
-            *trials += 1;
-            if *trials > MAX_STEPS {
-                return Err(StepError::TooManySteps { t, t_end, h });
+            if call.statistics.work(N) > self.most_work {
+                return Err(StepError::TooMuchWork { t, t_end, h });
             }
             let (shorter, reason) = match self.attempt(call, from, h, first || rejected) {
                 Ok(Attempt::Within { trial, error, dense }) => {

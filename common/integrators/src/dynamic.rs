@@ -10,7 +10,6 @@ use crate::error::SettingsError;
 use crate::first_step;
 use crate::norm::{counted, scaled};
 use crate::pace::{LEAST_ERROR, RESOLUTION, SAFETY, SHRINK, Taken, fit};
-use crate::run::MAX_STEPS;
 use crate::solver::Memory;
 use crate::{Method, Settings, Statistics, StepError};
 use table::{Errors, Extension, Row, Table};
@@ -282,7 +281,7 @@ impl ExplicitSolver {
         }
         let min = RESOLUTION * t.abs().max(t_end.abs());
         let wanted = self.memory.step.max(min);
-        let (now, rejected) = self.accepted(ode, fit(wanted, remaining), (t, t_end, min))?;
+        let (now, rejected) = self.accepted(ode, fit(wanted, remaining), (t, min))?;
         let pace = self.table.pace;
         let mut growth = pace.next(SAFETY, now, self.memory.error, self.before);
         if rejected {
@@ -302,10 +301,10 @@ impl ExplicitSolver {
         &mut self,
         ode: &mut O,
         mut h: f64,
-        (t, t_end, min): (f64, f64, f64),
+        (t, min): (f64, f64),
     ) -> Result<(Taken, bool), StepError<O::Error>> {
         let mut rejected = false;
-        for _ in 0..MAX_STEPS {
+        loop {
             let (shorter, reason) = match self.trial(ode, h) {
                 Ok(()) => {
                     let error = self.error();
@@ -330,7 +329,6 @@ impl ExplicitSolver {
             }
             h = shorter;
         }
-        Err(StepError::TooManySteps { t, t_end, h })
     }
 
     /// Local error of the trial in units of the tolerance.

@@ -71,10 +71,13 @@ pub enum StepError<E> {
         /// Start of the call [s].
         t: f64,
     },
-    /// The interval needs more than [`MAX_STEPS`](crate::MAX_STEPS) steps.
-    #[error("more than {} steps of {h:.3e} s needed from t = {t:.6} s to {t_end:.6} s", crate::MAX_STEPS)]
-    TooManySteps {
-        /// Where the steps ran out [s].
+    /// The call needs more work than [`MAX_EVALUATIONS`](crate::MAX_EVALUATIONS).
+    #[error(
+        "more than {} evaluations of the equations are needed: at t = {t:.6} s of {t_end:.6} s steps are {h:.3e} s long",
+        crate::MAX_EVALUATIONS
+    )]
+    TooMuchWork {
+        /// Where the solver gave up [s].
         t: f64,
         /// End asked for [s].
         t_end: f64,

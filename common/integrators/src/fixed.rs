@@ -2,7 +2,7 @@
 
 use crate::error::all_finite;
 use crate::one_step::{Call, OneStep};
-use crate::run::{MAX_STEPS, Run, Watch};
+use crate::run::{MAX_EVALUATIONS, Run, Watch};
 use crate::{Ode, Settings, StepError};
 
 /// Runs to `t_end` in `n` equal steps, see [`Settings::inner_steps`].
@@ -20,10 +20,11 @@ pub(crate) fn fixed<const N: usize, M: OneStep<N>, O: Ode<N>, W: Watch<N>>(
     let t_start = run.t;
     let span = t_end - t_start;
     let steps = settings.inner_steps(span);
-    if steps > f64::from(MAX_STEPS) {
-        return Err(StepError::TooManySteps { t: t_start, t_end, h: settings.step });
+    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+    if steps * f64::from(settings.method.stages()) > MAX_EVALUATIONS as f64 {
+        return Err(StepError::TooMuchWork { t: t_start, t_end, h: settings.step });
     }
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 1 to MAX_STEPS")]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 1 to MAX_EVALUATIONS")]
     let n = steps as u32;
     let h = span / steps;
     let mut slope = None;

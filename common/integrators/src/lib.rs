@@ -89,7 +89,7 @@ pub use events::{Crossing, Indicators, Reached};
 pub use exact::Transition;
 pub use method::Method;
 pub use ode::{Jacobian, Ode};
-pub use run::MAX_STEPS;
+pub use run::MAX_EVALUATIONS;
 pub use settings::Settings;
 pub use solver::{Memory, Solver};
 pub use stability::{MAX_AMPLIFICATION, largest_stable_step, violates};

@@ -4,11 +4,12 @@ use crate::error::all_finite;
 use crate::one_step::{Call, OneStep, Start};
 use crate::{Dense, Ode, StepError};
 
-/// Most steps that one call may take, rejected ones included: tenfold of the longest sensible call.
+/// Most work that one call may take, as [`Statistics::work`](crate::Statistics::work) counts it: a million steps of
+/// the classical Runge-Kutta method, and a quarter more.
 ///
-/// A step size of 1e-300 s, or an explicit method on a very stiff problem, then ends in an error after some seconds
-/// and not in a hang.
-pub const MAX_STEPS: u32 = 1_000_000;
+/// A step size of 1e-300 s, a motion at 1e9 rad/s or an explicit method on a very stiff problem then ends in an error
+/// after seconds and not in a hang.
+pub const MAX_EVALUATIONS: u64 = 5_000_000;
 
 /// Working copy of what a call changes; handed over only when it succeeds.
 #[derive(Clone, Copy)]

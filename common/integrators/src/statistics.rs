@@ -18,3 +18,13 @@ pub struct Statistics {
     /// Matrices decomposed by an implicit method; Radau5's real and complex one together count as one.
     pub decompositions: u64,
 }
+
+impl Statistics {
+    /// The work on `n` states, in evaluations of the right-hand side: a Jacobian counts as `2 (n + 1)` of them (in dual
+    /// numbers each costs up to two), a decomposition as `n`.
+    #[must_use]
+    pub const fn work(&self, n: usize) -> u64 {
+        let n = n as u64;
+        self.rhs_evaluations + 2 * (n + 1) * self.jacobians + n * self.decompositions
+    }
+}

@@ -2,9 +2,12 @@
 
 mod common;
 
+use std::cell::Cell;
+use std::convert::Infallible;
+
 use common::{GENERAL, Kepler, Linear, solver};
 use integrators::{
-    Indicators, Jacobian, MAX_STEPS, Memory, Method, Ode, Settings, SettingsError, Solver, Statistics,
+    Indicators, Jacobian, MAX_EVALUATIONS, Memory, Method, Ode, Settings, SettingsError, Solver, Statistics,
     StepError,
 };
 
@@ -40,6 +43,19 @@ impl Ode<1> for Hole {
     type Error = NoStrut;
     fn rhs(&self, t: f64, _x: &[f64; 1]) -> Result<[f64; 1], NoStrut> {
         Ok([if t < 1.0 { 1.0 } else { f64::NAN }])
+    }
+}
+
+/// `x'' = -omega^2 x` at 1e9 rad/s, counting its evaluations.
+struct Fast {
+    evaluations: Cell<u64>,
+}
+
+impl Ode<2> for Fast {
+    type Error = Infallible;
+    fn rhs(&self, _t: f64, [s, v]: &[f64; 2]) -> Result<[f64; 2], Infallible> {
+        self.evaluations.set(self.evaluations.get() + 1);
+        Ok([1e9 * v, -1e9 * s])
     }
 }
 
@@ -165,13 +181,41 @@ fn a_slope_that_is_not_a_number_is_never_passed_on() {
 
 /// A tiny step size or a very stiff problem ends in an error and not in a hang.
 #[test]
-fn too_many_steps_are_refused_before_the_first() {
+fn too_much_work_is_refused_before_the_first_step() {
     let error = failure(&mut solver(Method::Heun, 1e-300, 1.0), &Linear::OSCILLATOR, [0.0, 1.0], [1.0, 0.0]);
-    assert_eq!(error, StepError::TooManySteps { t: 0.0, t_end: 1.0, h: 1e-300 });
+    assert_eq!(error, StepError::TooMuchWork { t: 0.0, t_end: 1.0, h: 1e-300 });
     assert_eq!(
         error.to_string(),
-        format!("more than {MAX_STEPS} steps of 1.000e-300 s needed from t = 0.000000 s to 1.000000 s")
+        format!(
+            "more than {MAX_EVALUATIONS} evaluations of the equations are needed: at t = 0.000000 s of 1.000000 s steps are 1.000e-300 s long"
+        )
     );
+}
+
+/// A thousand million turns are wanted: each adaptive method gives up within its work.
+#[test]
+fn hopeless_adaptive_calls_are_given_up_in_bounded_time() {
+    for method in Method::ALL.into_iter().filter(|method| method.is_adaptive()) {
+        let fast = Fast { evaluations: Cell::new(0) };
+        let error = failure(&mut solver(method, 1.0, 1e-6), &fast, [0.0, 1.0], [1.0, 0.0]);
+        assert!(matches!(error, StepError::TooMuchWork { .. }), "{method:?}: {error:?}");
+        // at most one step beyond the bound; Jacobians by differences are 3 evaluations here and count as 6
+        let evaluations = fast.evaluations.get();
+        assert!(evaluations <= MAX_EVALUATIONS + 100, "{method:?}: {evaluations}");
+        assert!(evaluations >= MAX_EVALUATIONS / 4, "{method:?}: {evaluations}");
+    }
+}
+
+/// Ten seconds in steps of 1e-5 s are a long call, not a hopeless one.
+#[test]
+fn a_million_steps_of_runge_kutta_are_carried_out() {
+    let mut x = [1.0, 0.0];
+    let mut statistics = Statistics::default();
+    let mut rk4 = solver(Method::Rk4, 1e-5, 1.0);
+    rk4.advance(&Linear::OSCILLATOR, 0.0, 10.0, &mut x, &mut statistics).expect("within the bound");
+    assert_eq!(statistics.rhs_evaluations, 4_000_000);
+    // rounding of a million steps
+    assert!((x[0] - 10.0_f64.cos()).abs() < 1e-10, "{}", x[0]);
 }
 
 /// The transition matrix is for those who declare themselves linear.

@@ -1,18 +1,19 @@
-//! A shared library with FMI 3.0 functions, for programs that test it: types of the functions, symbols, messages.
+//! A shared library with FMI functions, for programs that test it: types of the functions, symbols, messages.
 //!
-//! Calling the functions stays unsafe and is left to the programs; FMI 2.0 would be a second module beside [`fmi3`].
+//! Calling the functions stays unsafe and is left to the programs.
 
 #![allow(
     unsafe_code,
     reason = "opens a C library and receives its callbacks; every block states why it is sound"
 )]
 
+pub mod fmi2;
 pub mod fmi3;
 mod library;
 mod log;
 
 pub use library::{Library, LoadError};
-pub use log::{Log, Message, log_message};
+pub use log::{Log, Message, log_format, log_message};
 
 use std::ffi::c_int;
 

@@ -84,3 +84,24 @@ pub unsafe extern "C" fn log_message(
     };
     log.add(Message { status, category: text(category), text: text(message) });
 }
+
+/// Receives messages of FMI 2.0 with one text each: `fmi2CallbackLogger` with a [`Log`] as environment.
+///
+/// The callback of the standard has a variable number of arguments, which stable Rust cannot receive; where C passes the
+/// first of them as any other (System V on x86-64), this function gets it.
+///
+/// # Safety
+/// As [`log_message`]; if `format` is `%s`, `text` is a string.
+pub unsafe extern "C" fn log_format(
+    environment: *mut c_void,
+    _instance: *const c_char,
+    status: Status,
+    category: *const c_char,
+    format: *const c_char,
+    text: *const c_char,
+) {
+    // SAFETY: null or a string, by the contract of this function.
+    let plain = format.is_null() || unsafe { CStr::from_ptr(format) } != c"%s";
+    // SAFETY: as above; without `%s` the format itself is the text.
+    unsafe { log_message(environment, status, category, if plain { format } else { text }) }
+}

@@ -1,14 +1,18 @@
 //! All functions in use, callable with any argument that is no undefined behaviour by itself.
 #![allow(unsafe_code, reason = "calls into a C library; every block states why it is sound")]
 
+mod fmi2;
+mod fmi3;
+
 use std::ffi::{CStr, CString, c_char};
 use std::path::Path;
 use std::ptr;
 
-use fmi_capi::fmi3::{self, Flag, Instance};
-use fmi_capi::{Library, LoadError, Log, Status, log_message};
+use fmi_capi::fmi2::Callbacks;
+use fmi_capi::fmi3::{self as functions, Flag, Instance};
+use fmi_capi::{Library, LoadError, Log, Status};
 
-use crate::standard::Interface;
+use crate::standard::{Interface, Version};
 
 /// Values handed over as a C array: their number, and a pointer to them or null.
 #[derive(Debug)]
@@ -37,6 +41,8 @@ impl<'a, T> Array<'a, T> {
 pub(crate) struct Handle {
     instance: Instance,
     log: Box<Log>,
+    /// Of FMI 2.0, where they have to live as long as the instance
+    _callbacks: Option<Box<Callbacks>>,
 }
 
 impl Handle {
@@ -47,7 +53,7 @@ impl Handle {
 
 /// The pointer of a saved state; null until something is saved.
 #[derive(Debug)]
-pub(crate) struct SavedState(fmi3::State);
+pub(crate) struct SavedState(functions::State);
 
 impl SavedState {
     pub(crate) const NONE: Self = Self(ptr::null_mut());
@@ -57,68 +63,73 @@ impl SavedState {
     }
 }
 
-/// Fields and look-ups of functions that have the same name in the library.
+/// Fields and look-ups of functions; with two names: in FMI 2.0 and FMI 3.0.
 macro_rules! library_functions {
     ($($field:ident: $type:ty = $symbol:literal;)*) => {
         /// The functions.
+        pub(super) struct Functions {
+            $(pub(super) $field: $type,)*
+        }
+
+        impl Functions {
+            pub(super) fn find(library: &fmi_capi::Library) -> Result<Self, fmi_capi::LoadError> {
+                Ok(Self { $($field: library.symbol($symbol)?,)* })
+            }
+        }
+    };
+    ($($field:ident: $type:ty = $fmi2:literal $fmi3:literal;)*) => {
+        /// Functions with the same signature in both versions.
         struct Functions {
             $($field: $type,)*
         }
 
         impl Functions {
-            fn find(library: &Library) -> Result<Self, LoadError> {
-                Ok(Self { $($field: library.symbol($symbol)?,)* })
+            fn find(library: &Library, version: Version) -> Result<Self, LoadError> {
+                let name = |fmi2, fmi3| if version == Version::Fmi2 { fmi2 } else { fmi3 };
+                Ok(Self { $($field: library.symbol(name($fmi2, $fmi3))?,)* })
             }
         }
     };
 }
+use library_functions;
 
 library_functions! {
-    instantiate_co_simulation: fmi3::InstantiateCoSimulation = "fmi3InstantiateCoSimulation";
-    instantiate_model_exchange: fmi3::InstantiateModelExchange = "fmi3InstantiateModelExchange";
-    free_instance: fmi3::FreeInstance = "fmi3FreeInstance";
-    set_debug_logging: fmi3::SetDebugLogging = "fmi3SetDebugLogging";
-    enter_initialization: fmi3::EnterInitialization = "fmi3EnterInitializationMode";
-    exit_initialization: fmi3::Simple = "fmi3ExitInitializationMode";
-    enter_event_mode: fmi3::Simple = "fmi3EnterEventMode";
-    enter_step_mode: fmi3::Simple = "fmi3EnterStepMode";
-    enter_continuous_time_mode: fmi3::Simple = "fmi3EnterContinuousTimeMode";
-    terminate: fmi3::Simple = "fmi3Terminate";
-    reset: fmi3::Simple = "fmi3Reset";
-    enter_configuration_mode: fmi3::Simple = "fmi3EnterConfigurationMode";
-    exit_configuration_mode: fmi3::Simple = "fmi3ExitConfigurationMode";
-    evaluate_discrete_states: fmi3::Simple = "fmi3EvaluateDiscreteStates";
-    update_discrete_states: fmi3::UpdateDiscreteStates = "fmi3UpdateDiscreteStates";
-    completed_integrator_step: fmi3::CompletedIntegratorStep = "fmi3CompletedIntegratorStep";
-    do_step: fmi3::DoStep = "fmi3DoStep";
-    set_time: fmi3::SetTime = "fmi3SetTime";
-    get_float64: fmi3::Get<f64> = "fmi3GetFloat64";
-    get_int32: fmi3::Get<i32> = "fmi3GetInt32";
-    get_int64: fmi3::Get<i64> = "fmi3GetInt64";
-    get_boolean: fmi3::Get<u8> = "fmi3GetBoolean";
-    get_float32: fmi3::Get<f32> = "fmi3GetFloat32";
-    set_float64: fmi3::Set<f64> = "fmi3SetFloat64";
-    set_int32: fmi3::Set<i32> = "fmi3SetInt32";
-    set_int64: fmi3::Set<i64> = "fmi3SetInt64";
-    set_boolean: fmi3::Set<u8> = "fmi3SetBoolean";
-    set_float32: fmi3::Set<f32> = "fmi3SetFloat32";
-    get_continuous_states: fmi3::GetList = "fmi3GetContinuousStates";
-    get_derivatives: fmi3::GetList = "fmi3GetContinuousStateDerivatives";
-    get_nominals: fmi3::GetList = "fmi3GetNominalsOfContinuousStates";
-    get_indicators: fmi3::GetList = "fmi3GetEventIndicators";
-    set_continuous_states: fmi3::SetList = "fmi3SetContinuousStates";
-    count_states: fmi3::Count = "fmi3GetNumberOfContinuousStates";
-    count_indicators: fmi3::Count = "fmi3GetNumberOfEventIndicators";
-    directional: fmi3::DirectionalDerivative = "fmi3GetDirectionalDerivative";
-    adjoint: fmi3::DirectionalDerivative = "fmi3GetAdjointDerivative";
-    count_dependencies: fmi3::CountDependencies = "fmi3GetNumberOfVariableDependencies";
-    dependencies: fmi3::Dependencies = "fmi3GetVariableDependencies";
-    get_state: fmi3::StateSlot = "fmi3GetFMUState";
-    set_state: fmi3::SetState = "fmi3SetFMUState";
-    free_state: fmi3::StateSlot = "fmi3FreeFMUState";
-    state_size: fmi3::StateSize = "fmi3SerializedFMUStateSize";
-    serialize: fmi3::Serialize = "fmi3SerializeFMUState";
-    deserialize: fmi3::Deserialize = "fmi3DeserializeFMUState";
+    free_instance: functions::FreeInstance = "fmi2FreeInstance" "fmi3FreeInstance";
+    exit_initialization: functions::Simple = "fmi2ExitInitializationMode" "fmi3ExitInitializationMode";
+    enter_event_mode: functions::Simple = "fmi2EnterEventMode" "fmi3EnterEventMode";
+    enter_continuous_time_mode: functions::Simple = "fmi2EnterContinuousTimeMode" "fmi3EnterContinuousTimeMode";
+    terminate: functions::Simple = "fmi2Terminate" "fmi3Terminate";
+    reset: functions::Simple = "fmi2Reset" "fmi3Reset";
+    set_time: functions::SetTime = "fmi2SetTime" "fmi3SetTime";
+    get_continuous_states: functions::GetList = "fmi2GetContinuousStates" "fmi3GetContinuousStates";
+    get_derivatives: functions::GetList = "fmi2GetDerivatives" "fmi3GetContinuousStateDerivatives";
+    get_nominals: functions::GetList = "fmi2GetNominalsOfContinuousStates" "fmi3GetNominalsOfContinuousStates";
+    get_indicators: functions::GetList = "fmi2GetEventIndicators" "fmi3GetEventIndicators";
+    set_continuous_states: functions::SetList = "fmi2SetContinuousStates" "fmi3SetContinuousStates";
+    get_state: functions::StateSlot = "fmi2GetFMUstate" "fmi3GetFMUState";
+    set_state: functions::SetState = "fmi2SetFMUstate" "fmi3SetFMUState";
+    free_state: functions::StateSlot = "fmi2FreeFMUstate" "fmi3FreeFMUState";
+    state_size: functions::StateSize = "fmi2SerializedFMUstateSize" "fmi3SerializedFMUStateSize";
+    serialize: functions::Serialize = "fmi2SerializeFMUstate" "fmi3SerializeFMUState";
+    deserialize: functions::Deserialize = "fmi2DeSerializeFMUstate" "fmi3DeserializeFMUState";
+}
+
+/// Functions that are different in the versions.
+enum Special {
+    Fmi2(fmi2::Functions),
+    Fmi3(fmi3::Functions),
+}
+
+/// Questions about the last step in FMI 2.0, and about derivatives that are not offered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Inquiry {
+    Status,
+    Real,
+    Integer,
+    Boolean,
+    String,
+    InputDerivatives,
+    OutputDerivatives,
 }
 
 /// Functions without arguments.
@@ -163,6 +174,7 @@ pub(crate) struct Updated {
 /// An FMU's library.
 pub(crate) struct Api {
     f: Functions,
+    special: Special,
     // last: closed after everything else
     _library: Library,
 }
@@ -181,47 +193,26 @@ fn unless<T>(pointer: *mut T, null: Option<usize>, index: usize) -> *mut T {
 }
 
 impl Api {
-    pub(crate) fn load(path: &Path) -> Result<Self, LoadError> {
+    pub(crate) fn load(path: &Path, version: Version) -> Result<Self, LoadError> {
         let library = Library::open(path)?;
-        Ok(Self { f: Functions::find(&library)?, _library: library })
+        let special = match version {
+            Version::Fmi2 => Special::Fmi2(fmi2::Functions::find(&library)?),
+            Version::Fmi3 => Special::Fmi3(fmi3::Functions::find(&library)?),
+        };
+        Ok(Self { f: Functions::find(&library, version)?, special, _library: library })
     }
 
     /// A new instance, or what was said instead.
     pub(crate) fn instantiate(&self, interface: Interface, token: &CStr) -> Result<Handle, Box<Log>> {
         let log = Box::<Log>::default();
-        let environment = ptr::from_ref::<Log>(&log).cast_mut().cast();
-        let (name, none) = (c"fuzz".as_ptr(), ptr::null());
-        // SAFETY: the strings live; the log is dropped after the instance is freed, and stays where it is.
-        let instance = unsafe {
-            if interface == Interface::ModelExchange {
-                (self.f.instantiate_model_exchange)(
-                    name,
-                    token.as_ptr(),
-                    none,
-                    0,
-                    1,
-                    environment,
-                    Some(log_message),
-                )
-            } else {
-                let events = Flag::from(interface == Interface::CoSimulationWithEvents);
-                (self.f.instantiate_co_simulation)(
-                    name,
-                    token.as_ptr(),
-                    none,
-                    0,
-                    1,
-                    events,
-                    0,
-                    ptr::null(),
-                    0,
-                    environment,
-                    Some(log_message),
-                    None,
-                )
+        let (instance, callbacks) = match &self.special {
+            Special::Fmi2(f) => {
+                let (instance, callbacks) = f.instantiate(interface, token, &log);
+                (instance, Some(callbacks))
             }
+            Special::Fmi3(f) => (f.instantiate(interface, token, &log), None),
         };
-        if instance.is_null() { Err(log) } else { Ok(Handle { instance, log }) }
+        if instance.is_null() { Err(log) } else { Ok(Handle { instance, log, _callbacks: callbacks }) }
     }
 
     /// Free an instance, or call the function with null.
@@ -234,75 +225,107 @@ impl Api {
     pub(crate) fn set_debug_logging(&self, handle: Option<&Handle>, on: bool, names: &[String]) -> Status {
         let names: Vec<_> = names.iter().map(|n| CString::new(n.as_str()).unwrap_or_default()).collect();
         let pointers: Vec<*const c_char> = names.iter().map(|name| name.as_ptr()).collect();
+        let (n, pointers) = (pointers.len(), pointers.as_ptr());
         // SAFETY: see `of`.
-        unsafe { (self.f.set_debug_logging)(of(handle), Flag::from(on), pointers.len(), pointers.as_ptr()) }
+        unsafe {
+            match &self.special {
+                Special::Fmi2(f) => (f.set_debug_logging)(of(handle), i32::from(on), n, pointers),
+                Special::Fmi3(f) => (f.set_debug_logging)(of(handle), Flag::from(on), n, pointers),
+            }
+        }
     }
 
+    /// In FMI 2.0 the experiment is set up before.
     pub(crate) fn enter_initialization(
         &self,
         handle: Option<&Handle>,
         start: f64,
         stop: Option<f64>,
     ) -> Status {
-        let defined = Flag::from(stop.is_some());
-        // SAFETY: see `of`.
-        unsafe { (self.f.enter_initialization)(of(handle), 0, 0.0, start, defined, stop.unwrap_or(f64::NAN)) }
+        match &self.special {
+            Special::Fmi2(f) => f.enter_initialization(of(handle), start, stop),
+            Special::Fmi3(f) => f.enter_initialization(of(handle), start, stop),
+        }
     }
 
     pub(crate) fn transition(&self, handle: Option<&Handle>, transition: Transition) -> Status {
         let f = match transition {
             Transition::ExitInitialization => self.f.exit_initialization,
             Transition::EnterEventMode => self.f.enter_event_mode,
-            Transition::EnterStepMode => self.f.enter_step_mode,
             Transition::EnterContinuousTimeMode => self.f.enter_continuous_time_mode,
             Transition::Terminate => self.f.terminate,
             Transition::Reset => self.f.reset,
-            Transition::EnterConfigurationMode => self.f.enter_configuration_mode,
-            Transition::ExitConfigurationMode => self.f.exit_configuration_mode,
-            Transition::EvaluateDiscreteStates => self.f.evaluate_discrete_states,
+            other => {
+                return match &self.special {
+                    Special::Fmi2(f) => f.transition(of(handle), other),
+                    Special::Fmi3(f) => f.transition(of(handle), other),
+                };
+            }
         };
         // SAFETY: see `of`.
         unsafe { f(of(handle)) }
     }
 
+    /// Which of its pointers is null is of FMI 3.0 only.
     pub(crate) fn do_step(
         &self,
         handle: Option<&Handle>,
-        (t, step): (f64, f64),
+        times: (f64, f64),
         null: Option<usize>,
     ) -> (Status, Stepped) {
-        let mut s = Stepped { event: 7, terminate: 7, early: 7, last: f64::NAN };
-        let (event, terminate, early) = (&raw mut s.event, &raw mut s.terminate, &raw mut s.early);
-        let last = unless(&raw mut s.last, null, 3);
-        let (event, terminate, early) =
-            (unless(event, null, 0), unless(terminate, null, 1), unless(early, null, 2));
-        // SAFETY: see `of`.
-        let status = unsafe { (self.f.do_step)(of(handle), t, step, 0, event, terminate, early, last) };
-        (status, s)
+        match &self.special {
+            Special::Fmi2(f) => f.do_step(of(handle), times),
+            Special::Fmi3(f) => f.do_step(of(handle), times, null),
+        }
     }
 
     pub(crate) fn update(&self, handle: Option<&Handle>, null: Option<usize>) -> (Status, Updated) {
-        let mut updated = Updated { flags: [7; 5], next: 0.0 };
-        let mut pointers = [ptr::null_mut(); 5];
-        for (i, (pointer, flag)) in pointers.iter_mut().zip(&mut updated.flags).enumerate() {
-            *pointer = unless(flag, null, i);
+        match &self.special {
+            Special::Fmi2(f) => f.update(of(handle), null),
+            Special::Fmi3(f) => f.update(of(handle), null),
         }
-        let [a, b, c, d, e] = pointers;
-        // SAFETY: see `of`.
-        let status = unsafe {
-            (self.f.update_discrete_states)(of(handle), a, b, c, d, e, unless(&raw mut updated.next, null, 5))
-        };
-        (status, updated)
     }
 
     pub(crate) fn completed_step(&self, handle: Option<&Handle>, null: Option<usize>) -> (Status, [Flag; 2]) {
-        let (mut event, mut terminate) = (7, 7);
-        // SAFETY: see `of`.
-        let status = unsafe {
-            let (event, terminate) = (unless(&raw mut event, null, 0), unless(&raw mut terminate, null, 1));
-            (self.f.completed_integrator_step)(of(handle), 0, event, terminate)
-        };
-        (status, [event, terminate])
+        match &self.special {
+            Special::Fmi2(f) => f.completed_step(of(handle), null),
+            Special::Fmi3(f) => f.completed_step(of(handle), null),
+        }
+    }
+
+    /// Numbers of states and indicators; FMI 2.0 does not tell them.
+    pub(crate) fn count(&self, handle: Option<&Handle>, states: bool, null: bool) -> (Status, usize) {
+        match &self.special {
+            Special::Fmi2(_) => (fmi_capi::ERROR, 0),
+            Special::Fmi3(f) => f.count(of(handle), states, null),
+        }
+    }
+
+    /// Dependencies of a variable; FMI 2.0 does not tell them.
+    pub(crate) fn dependencies(
+        &self,
+        handle: Option<&Handle>,
+        reference: u32,
+        n: Option<usize>,
+    ) -> (Status, Vec<u32>) {
+        match &self.special {
+            Special::Fmi2(_) => (fmi_capi::ERROR, Vec::new()),
+            Special::Fmi3(f) => f.dependencies(of(handle), reference, n),
+        }
+    }
+
+    /// Questions that only FMI 2.0 has.
+    pub(crate) fn inquire(
+        &self,
+        handle: Option<&Handle>,
+        inquiry: Inquiry,
+        kind: i32,
+        null: bool,
+    ) -> (Status, u64) {
+        match &self.special {
+            Special::Fmi2(f) => f.inquire(of(handle), inquiry, kind, null),
+            Special::Fmi3(_) => (fmi_capi::ERROR, 0),
+        }
     }
 
     pub(crate) fn set_time(&self, handle: Option<&Handle>, t: f64) -> Status {
@@ -326,14 +349,6 @@ impl Api {
         unsafe { (self.f.set_continuous_states)(of(handle), values.pointer(), values.len()) }
     }
 
-    pub(crate) fn count(&self, handle: Option<&Handle>, states: bool, null: bool) -> (Status, usize) {
-        let f = if states { self.f.count_states } else { self.f.count_indicators };
-        let mut n = usize::MAX;
-        // SAFETY: see `of`.
-        let status = unsafe { f(of(handle), if null { ptr::null_mut() } else { &raw mut n }) };
-        (status, n)
-    }
-
     pub(crate) fn directional(
         &self,
         handle: Option<&Handle>,
@@ -341,54 +356,29 @@ impl Api {
         (mut unknowns, mut knowns): (Array<u32>, Array<u32>),
         (mut seed, mut sensitivity): (Array<f64>, Array<f64>),
     ) -> Status {
-        let f = if adjoint { self.f.adjoint } else { self.f.directional };
         let (n_unknowns, n_knowns) = (unknowns.len(), knowns.len());
         let (n_seed, n_sensitivity) = (seed.len(), sensitivity.len());
+        let (unknowns, knowns) = (unknowns.pointer(), knowns.pointer());
+        let (seed, sensitivity) = (seed.pointer(), sensitivity.pointer());
         // SAFETY: see `of`.
         unsafe {
-            f(
-                of(handle),
-                unknowns.pointer(),
-                n_unknowns,
-                knowns.pointer(),
-                n_knowns,
-                seed.pointer(),
-                n_seed,
-                sensitivity.pointer(),
-                n_sensitivity,
-            )
+            match &self.special {
+                Special::Fmi2(f) => {
+                    (f.directional)(of(handle), unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity)
+                }
+                Special::Fmi3(f) => (if adjoint { f.adjoint } else { f.directional })(
+                    of(handle),
+                    unknowns,
+                    n_unknowns,
+                    knowns,
+                    n_knowns,
+                    seed,
+                    n_seed,
+                    sensitivity,
+                    n_sensitivity,
+                ),
+            }
         }
-    }
-
-    /// Number of dependencies, then the list for `n` of them.
-    pub(crate) fn dependencies(
-        &self,
-        handle: Option<&Handle>,
-        reference: u32,
-        n: Option<usize>,
-    ) -> (Status, Vec<u32>) {
-        let mut count = 0;
-        // SAFETY: see `of`.
-        let status = unsafe { (self.f.count_dependencies)(of(handle), reference, &raw mut count) };
-        let n = n.unwrap_or(count);
-        if status != fmi_capi::OK && n == 0 {
-            return (status, Vec::new());
-        }
-        let (mut elements, mut independents, mut others) = (vec![0; n], vec![0_u32; n], vec![0; n]);
-        let mut kinds = vec![0; n];
-        // SAFETY: see `of`; all lists have n places.
-        let status = unsafe {
-            (self.f.dependencies)(
-                of(handle),
-                reference,
-                elements.as_mut_ptr(),
-                independents.as_mut_ptr(),
-                others.as_mut_ptr(),
-                kinds.as_mut_ptr(),
-                n,
-            )
-        };
-        (status, independents)
     }
 
     pub(crate) fn save(&self, handle: Option<&Handle>, state: &mut SavedState) -> Status {
@@ -406,16 +396,22 @@ impl Api {
         unsafe { (self.f.free_state)(of(handle), &raw mut state.0) }
     }
 
-    /// The state as bytes.
-    pub(crate) fn serialize(&self, handle: Option<&Handle>, state: &SavedState) -> (Status, Vec<u8>) {
+    /// The state as bytes, asked for with `surplus` more of them than it has.
+    pub(crate) fn serialize(
+        &self,
+        handle: Option<&Handle>,
+        state: &SavedState,
+        surplus: isize,
+    ) -> (Status, Vec<u8>) {
         let mut size = 0;
         // SAFETY: see `of`; null or a state of this library.
         let status = unsafe { (self.f.state_size)(of(handle), state.0, &raw mut size) };
         if status != fmi_capi::OK {
             return (status, Vec::new());
         }
+        let size = size.saturating_add_signed(surplus);
         let mut bytes = vec![0_u8; size];
-        // SAFETY: as above; `bytes` has the size asked for.
+        // SAFETY: as above; `bytes` has the size that the call says.
         let status = unsafe { (self.f.serialize)(of(handle), state.0, bytes.as_mut_ptr(), size) };
         (status, bytes)
     }
@@ -430,30 +426,49 @@ impl Api {
     }
 }
 
-/// Get and Set of one type.
+/// Get and Set of one type: its functions, and what is called in FMI 2.0.
 macro_rules! access {
-    ($($get:ident $set:ident $type:ty;)*) => {
+    ($($get:ident $set:ident $type:ty, $get2:expr, $set2:expr;)*) => {
         impl Api {
             $(
                 pub(crate) fn $get(&self, handle: Option<&Handle>, mut references: Array<u32>, mut values: Array<$type>) -> Status {
                     let (n, n_values) = (references.len(), values.len());
-                    // SAFETY: see `of`.
-                    unsafe { (self.f.$get)(of(handle), references.pointer(), n, values.pointer(), n_values) }
+                    match &self.special {
+                        Special::Fmi2(f) => $get2(f, of(handle), references, values),
+                        // SAFETY: see `of`.
+                        Special::Fmi3(f) => unsafe { (f.$get)(of(handle), references.pointer(), n, values.pointer(), n_values) },
+                    }
                 }
 
                 pub(crate) fn $set(&self, handle: Option<&Handle>, mut references: Array<u32>, mut values: Array<$type>) -> Status {
                     let (n, n_values) = (references.len(), values.len());
-                    // SAFETY: see `of`.
-                    unsafe { (self.f.$set)(of(handle), references.pointer(), n, values.pointer(), n_values) }
+                    match &self.special {
+                        Special::Fmi2(f) => $set2(f, of(handle), references, values),
+                        // SAFETY: see `of`.
+                        Special::Fmi3(f) => unsafe { (f.$set)(of(handle), references.pointer(), n, values.pointer(), n_values) },
+                    }
                 }
             )*
         }
     };
 }
+
+/// A function of FMI 2.0 with as many values as references.
+macro_rules! plain {
+    ($function:ident $type:ty) => {
+        |f: &fmi2::Functions, instance, mut references: Array<u32>, mut values: Array<$type>| {
+            // SAFETY: see `of`; there are as many values as references, see `generate`.
+            unsafe { (f.$function)(instance, references.pointer(), references.len(), values.pointer()) }
+        }
+    };
+}
+
 access! {
-    get_float64 set_float64 f64;
-    get_int32 set_int32 i32;
-    get_int64 set_int64 i64;
-    get_boolean set_boolean u8;
-    get_float32 set_float32 f32;
+    get_float64 set_float64 f64, plain!(get_real f64), plain!(set_real f64);
+    get_int32 set_int32 i32, plain!(get_integer i32), plain!(set_integer i32);
+    get_int64 set_int64 i64, |_, _, _, _| fmi_capi::ERROR, |_, _, _, _| fmi_capi::ERROR;
+    get_boolean set_boolean u8, fmi2::Functions::get_flags, fmi2::Functions::set_flags;
+    get_float32 set_float32 f32,
+        |f: &fmi2::Functions, instance, references, _| f.strings(instance, false, references),
+        |f: &fmi2::Functions, instance, references, _| f.strings(instance, true, references);
 }

@@ -5,6 +5,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use crate::description::{Description, DescriptionError};
+use crate::standard::Version;
 
 /// Why an FMU cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -15,6 +16,14 @@ pub(crate) enum ArchiveError {
     Zip { path: PathBuf, source: zip::result::ZipError },
     #[error(transparent)]
     Description(#[from] DescriptionError),
+}
+
+/// Folder of the library for this platform.
+fn platform(version: Version) -> &'static str {
+    match version {
+        Version::Fmi2 => "linux64",
+        Version::Fmi3 => "x86_64-linux",
+    }
 }
 
 /// The description of the FMU, and its library: written into `folder`, unless another one is given.
@@ -32,7 +41,7 @@ pub(crate) fn open(
     if let Some(library) = library {
         return Ok((description, library.into()));
     }
-    let name = format!("binaries/x86_64-linux/{}.so", description.identifier);
+    let name = format!("binaries/{}/{}.so", platform(description.version), description.identifier);
     let mut content = Vec::new();
     zip.by_name(&name).map_err(in_zip)?.read_to_end(&mut content).map_err(in_file)?;
     let target = folder.join(format!("{}.so", description.identifier));

@@ -1,6 +1,6 @@
 //! A call as data: it can be left out of a sequence without changing the others.
 
-use crate::api::{Lists, Transition};
+use crate::api::{Inquiry, Lists, Transition};
 use crate::standard::Interface;
 
 /// One call on one of the places for instances.
@@ -18,7 +18,7 @@ pub(crate) enum Access {
     /// Enumerations too
     Int64,
     Boolean,
-    /// There are no such variables
+    /// There are no such variables; strings in FMI 2.0
     Float32,
 }
 
@@ -52,6 +52,10 @@ pub(crate) enum Mutation {
     Longer(usize),
     /// Random bytes of this number
     Noise(usize),
+    /// The state of another FMU
+    Foreign,
+    /// The bytes are asked for with another size
+    WrongSize(isize),
 }
 
 /// What is called.
@@ -126,12 +130,18 @@ pub(crate) enum Action {
         store: usize,
         mutation: Mutation,
     },
+    /// What FMI 2.0 answers about the last step
+    Inquire {
+        inquiry: Inquiry,
+        kind: i32,
+        null: bool,
+    },
     /// Read everything that may be read
     Observe,
 }
 
 impl Action {
-    /// True if the call only reads.
+    /// True if the call only reads; a state that comes back from its bytes is the same.
     pub(crate) fn reads(&self) -> bool {
         matches!(
             self,
@@ -140,6 +150,8 @@ impl Action {
                 | Self::Count { .. }
                 | Self::Directional { .. }
                 | Self::Dependencies { .. }
+                | Self::Inquire { .. }
+                | Self::Serialize { .. }
                 | Self::Observe
         )
     }

@@ -5,6 +5,8 @@ use std::collections::HashMap;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
+use crate::standard::Version;
+
 /// Type of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
@@ -70,6 +72,7 @@ impl Variable {
 /// A model description.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Description {
+    pub(crate) version: Version,
     pub(crate) identifier: String,
     pub(crate) token: String,
     pub(crate) model_exchange: bool,
@@ -115,6 +118,7 @@ impl Description {
         let mut types: HashMap<String, Vec<(String, i64)>> = HashMap::new();
         let mut open_type = String::new();
         let mut states = Vec::new();
+        let mut identity = Attributes::new();
         let mut reader = Reader::from_str(xml);
         loop {
             let event = reader.read_event()?;
@@ -124,16 +128,26 @@ impl Description {
                 _ => continue,
             };
             let name = element.name().as_ref().to_string();
-            let a = attributes(element)?;
+            let mut a = attributes(element)?;
+            if name == "ScalarVariable" {
+                identity = a; // the type follows as an element inside
+                continue;
+            }
             let number = |name: &str| a.get(name).and_then(|v| v.parse::<f64>().ok());
             match name.as_str() {
+                "fmiModelDescription" if text(&a, "fmiVersion").starts_with('2') => {
+                    found.version = Version::Fmi2;
+                    found.token = text(&a, "guid");
+                    found.indicators = text(&a, "numberOfEventIndicators").parse().unwrap_or(0);
+                }
                 "fmiModelDescription" => found.token = text(&a, "instantiationToken"),
                 "CoSimulation" => {
                     found.identifier = text(&a, "modelIdentifier");
-                    found.serialises = a.get("canSerializeFMUState").is_some_and(|v| v == "true");
+                    let serialises = a.get("canSerializeFMUState").or(a.get("canSerializeFMUstate"));
+                    found.serialises = serialises.is_some_and(|v| v == "true");
                 }
                 "ModelExchange" => found.model_exchange = true,
-                "EnumerationType" => open_type = text(&a, "name"),
+                "EnumerationType" | "SimpleType" => open_type = text(&a, "name"),
                 "Item" => {
                     let value = text(&a, "value").parse().unwrap_or(0);
                     types.entry(open_type.clone()).or_default().push((text(&a, "name"), value));
@@ -144,7 +158,10 @@ impl Description {
                     found.step = number("stepSize").unwrap_or(0.01);
                 }
                 "EventIndicator" => found.indicators += 1,
-                "Float64" | "Int32" | "Int64" | "Boolean" | "Enumeration" => {
+                // inside the element of an FMI 2.0 type
+                "Enumeration" if a.is_empty() => {}
+                "Float64" | "Int32" | "Int64" | "Boolean" | "Enumeration" | "Real" | "Integer" => {
+                    a.extend(identity.drain());
                     let variable = variable(&name, &a, &types);
                     let reference = text(&a, "valueReference");
                     let expected = found.variables.len();
@@ -155,7 +172,10 @@ impl Description {
                             expected,
                         });
                     }
-                    states.extend(a.get("derivative").and_then(|state| state.parse::<usize>().ok()));
+                    // FMI 2.0 counts from 1
+                    let first = usize::from(found.version == Version::Fmi2);
+                    let state = a.get("derivative").and_then(|state| state.parse::<usize>().ok());
+                    states.extend(state.and_then(|state| state.checked_sub(first)));
                     found.variables.push(variable);
                 }
                 _ => {}
@@ -183,8 +203,8 @@ fn text(a: &Attributes, name: &str) -> String {
 
 fn variable(element: &str, a: &Attributes, types: &HashMap<String, Vec<(String, i64)>>) -> Variable {
     let kind = match element {
-        "Float64" => Kind::Float64,
-        "Int32" => Kind::Int32,
+        "Float64" | "Real" => Kind::Float64,
+        "Int32" | "Integer" => Kind::Int32,
         "Int64" => Kind::Int64,
         "Boolean" => Kind::Boolean,
         _ => Kind::Enumeration,
@@ -251,6 +271,23 @@ mod tests {
         assert!(a.in_range(0.0) && !a.in_range(-1e-300) && !a.in_range(f64::NAN));
         assert!(e.in_range(1.0) && !e.in_range(2.0));
         assert!(x.state && rate.derivative && !rate.state && time.causality == Causality::Independent);
+    }
+
+    const XML_2: &str = r#"<fmiModelDescription fmiVersion="2.0" guid="{t}" numberOfEventIndicators="2"><CoSimulation modelIdentifier="m"/>
+        <TypeDefinitions><SimpleType name="E"><Enumeration><Item name="one" value="1"/></Enumeration></SimpleType></TypeDefinitions>
+        <ModelVariables><ScalarVariable name="e" valueReference="0" causality="parameter" variability="fixed">
+        <Enumeration declaredType="E" start="1"/></ScalarVariable>
+        <ScalarVariable name="x" valueReference="1" causality="output" variability="continuous"><Real start="1"/></ScalarVariable>
+        <ScalarVariable name="der(x)" valueReference="2" causality="local" variability="continuous"><Real derivative="2"/></ScalarVariable>
+        </ModelVariables></fmiModelDescription>"#;
+
+    #[test]
+    fn a_description_of_fmi2_is_read() {
+        let d = Description::parse(XML_2).unwrap();
+        assert_eq!((d.version, d.token.as_str(), d.states, d.indicators), (Version::Fmi2, "{t}", 1, 2));
+        let [e, x, rate] = &d.variables[..] else { panic!("three variables") };
+        assert!(e.in_range(1.0) && !e.in_range(2.0) && x.state && rate.derivative);
+        assert_eq!((x.name.as_str(), x.kind, rate.causality), ("x", Kind::Float64, Causality::Local));
     }
 
     #[test]

@@ -39,6 +39,10 @@ impl Expected {
         Self { statuses: 0, offences: Vec::new() }.or(ERROR)
     }
 
+    pub(crate) fn discard() -> Self {
+        Self { statuses: 0, offences: Vec::new() }.or(DISCARD)
+    }
+
     /// This status is right too.
     pub(crate) fn or(mut self, status: Status) -> Self {
         self.statuses |= 1 << status;

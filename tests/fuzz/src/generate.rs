@@ -1,11 +1,11 @@
 //! Sequences of calls from a seed: mostly a run that makes sense, with everything else in between.
 
-use crate::api::{Lists, Transition};
+use crate::api::{Inquiry, Lists, Transition};
 use crate::call::{Access, Action, At, Call, Mutation, Spoil};
 use crate::description::{Causality, Description, Kind, Variable};
 use crate::machine::{SLOTS, STORES};
 use crate::random::Random;
-use crate::standard::{self, Function, Interface, Phase};
+use crate::standard::{self, Function, Interface, Phase, Version};
 
 /// Longest sequence.
 const MOST_CALLS: usize = 60;
@@ -50,7 +50,41 @@ pub(crate) struct Generator<'a> {
 pub(crate) fn sequence(seed: u64, description: &Description) -> Vec<Call> {
     let mut generator = Generator { random: Random::new(seed), description, places: [None; SLOTS] };
     let n = 4 + generator.random.below(MOST_CALLS - 3);
-    (0..n).map(|_| generator.call()).collect()
+    let calls = (0..n).map(|_| generator.call());
+    match description.version {
+        Version::Fmi2 => calls.map(in_fmi2).collect(),
+        Version::Fmi3 => calls.collect(),
+    }
+}
+
+/// The call in FMI 2.0: one number counts both arrays, and some functions are not there.
+fn in_fmi2(mut call: Call) -> Call {
+    let one_number = |spoil: &mut Spoil| {
+        if matches!(spoil, Spoil::OneMore | Spoil::OneLess) {
+            *spoil = Spoil::Nothing;
+        }
+    };
+    match &mut call.action {
+        Action::Get { access: access @ Access::Int64, .. }
+        | Action::Set { access: access @ Access::Int64, .. } => *access = Access::Int32,
+        _ => {}
+    }
+    match &mut call.action {
+        Action::Get { spoil, .. } | Action::Set { spoil, .. } => one_number(spoil),
+        Action::Directional { spoil, adjoint, .. } => {
+            one_number(spoil);
+            *adjoint = false;
+        }
+        Action::DoStep { null, .. } => *null = None,
+        Action::Transition(
+            other @ (Transition::EnterStepMode
+            | Transition::EnterConfigurationMode
+            | Transition::ExitConfigurationMode),
+        ) => *other = Transition::EvaluateDiscreteStates,
+        Action::Count { .. } | Action::Dependencies { .. } => call.action = Action::Observe,
+        _ => {}
+    }
+    call
 }
 
 impl Generator<'_> {
@@ -66,11 +100,7 @@ impl Generator<'_> {
     }
 
     fn interface(&mut self) -> Interface {
-        self.random.pick(&[
-            Interface::ModelExchange,
-            Interface::CoSimulationWithEvents,
-            Interface::CoSimulation,
-        ])
+        self.random.pick(Interface::of(self.description.version))
     }
 
     /// Where the instance is after the call.
@@ -104,7 +134,7 @@ impl Generator<'_> {
 
     /// A call that belongs to the state.
     fn sensible(&mut self, place: Place) -> Action {
-        let exchange = place.interface == Interface::ModelExchange;
+        let exchange = place.interface.is_model_exchange();
         let events = place.interface == Interface::CoSimulationWithEvents;
         let dice = self.random.below(100);
         match place.phase {
@@ -163,7 +193,7 @@ impl Generator<'_> {
     fn any(&mut self) -> Action {
         let interface = self.interface();
         let place = Place { interface, phase: Phase::Event };
-        match self.random.below(26) {
+        match self.random.below(28) {
             0 => Action::Instantiate(interface),
             1 => Action::InstantiateWrongly(interface),
             2 => Action::Free,
@@ -205,6 +235,7 @@ impl Generator<'_> {
                 n: self.random.chance(30).then(|| self.random.below(40)),
             },
             23 | 24 => self.state_call(),
+            25 | 26 if self.description.version == Version::Fmi2 => self.inquire(),
             _ => Action::Observe,
         }
     }
@@ -293,7 +324,8 @@ impl Generator<'_> {
             1..7 => 1 + self.random.below(3),
             _ => 1 + self.random.below(12),
         };
-        let right = self.description.references(|v| Access::of(v.kind) == access && wanted(v));
+        let version = self.description.version;
+        let right = self.description.references(|v| Access::of(v.kind, version) == access && wanted(v));
         let n = if right.is_empty() { n.min(1) } else { n };
         (0..n)
             .map(|_| {
@@ -307,7 +339,9 @@ impl Generator<'_> {
     }
 
     fn access(&mut self) -> Access {
-        if self.random.chance(60) { Access::Float64 } else { self.random.pick(&Access::ALL) }
+        let access = if self.random.chance(60) { Access::Float64 } else { self.random.pick(&Access::ALL) };
+        let version = self.description.version;
+        if access == Access::Int64 && version == Version::Fmi2 { Access::Int32 } else { access }
     }
 
     fn get(&mut self) -> Action {
@@ -392,18 +426,38 @@ impl Generator<'_> {
         Action::Directional { adjoint: self.random.chance(3), unknowns, knowns, spoil: self.spoil() }
     }
 
+    fn inquire(&mut self) -> Action {
+        let inquiry = self.random.pick(&[
+            Inquiry::Status,
+            Inquiry::Real,
+            Inquiry::Real,
+            Inquiry::Integer,
+            Inquiry::Boolean,
+            Inquiry::String,
+            Inquiry::InputDerivatives,
+            Inquiry::OutputDerivatives,
+        ]);
+        let kind = self.random.pick(&[0, 1, 2, 2, 3, 4, i32::MAX]);
+        Action::Inquire { inquiry, kind, null: self.random.chance(10) }
+    }
+
     fn state_call(&mut self) -> Action {
         let store = if self.random.chance(60) { 0 } else { self.random.below(STORES) };
         match self.random.below(20) {
-            0..8 => Action::Save(store),
-            8..16 => Action::Restore(store),
-            16 => Action::FreeState(store),
+            0..7 => Action::Save(store),
+            7..13 => Action::Restore(store),
+            13 => Action::FreeState(store),
             _ => {
                 let place = self.random.below(1 << 20);
                 let mutation = self.random.pick(&[
                     Mutation::None,
                     Mutation::None,
+                    Mutation::None,
                     Mutation::Flip(place),
+                    Mutation::Flip(place % (1 << 9)),
+                    Mutation::Foreign,
+                    Mutation::WrongSize(1),
+                    Mutation::WrongSize(-1),
                     Mutation::Cut(place),
                     Mutation::Longer(place),
                     Mutation::Noise(place),

@@ -6,11 +6,11 @@ use std::ffi::CString;
 
 use fmi_capi::{DISCARD, ERROR, OK, Status, WARNING, status_name};
 
-use crate::api::{Api, Array, Handle, SavedState, Transition};
-use crate::call::{Action, At, Call};
+use crate::api::{Api, Array, Handle, Inquiry, SavedState, Transition};
+use crate::call::{Action, At, Call, Mutation};
 use crate::description::{Causality, Description, Variable};
 use crate::expect::{Expected, Offence, check_message};
-use crate::standard::{self, Function, Interface, Phase, Verdict};
+use crate::standard::{self, Function, Interface, Phase, Verdict, Version};
 use crate::watchdog;
 
 /// Places for instances and for saved states.
@@ -22,6 +22,8 @@ pub(crate) struct Fmu {
     pub(crate) api: Api,
     pub(crate) description: Description,
     pub(crate) token: CString,
+    /// The serialised state of another FMU; may be empty
+    pub(crate) foreign: Vec<u8>,
 }
 
 /// What is known about an instance; a saved state carries it too.
@@ -210,13 +212,14 @@ impl<'a> Machine<'a> {
             Action::Restore(store) => self.restore(slot, *store),
             Action::FreeState(store) => self.free_state(slot, *store),
             Action::Serialize { store, mutation } => self.serialize(slot, *store, *mutation),
+            Action::Inquire { inquiry, kind, null } => self.inquire(slot, *inquiry, *kind, *null),
             Action::Observe => Ok((Record { status: OK, data: self.observe(slot)? }, Expected::ok())),
         }
     }
 
     fn instantiate(&mut self, slot: usize, interface: Interface) -> Answer {
         self.fmu.api.free(self.slots[slot].take().map(|slot| slot.handle));
-        let possible = interface != Interface::ModelExchange || self.fmu.description.model_exchange;
+        let possible = !interface.is_model_exchange() || self.fmu.description.model_exchange;
         match self.fmu.api.instantiate(interface, &self.fmu.token) {
             Ok(handle) => {
                 let known = Known::new(interface, &self.fmu.description);
@@ -253,8 +256,16 @@ impl<'a> Machine<'a> {
         {
             slot.categories = match (on, categories.is_empty()) {
                 (true, true) => None,
-                (true, false) => Some(categories.to_vec()),
-                (false, _) => Some(Vec::new()), // it may say as little as it likes
+                (true, false) => {
+                    let before = slot.categories.take().unwrap_or_default();
+                    Some([before, categories.to_vec()].concat())
+                }
+                (false, true) => Some(Vec::new()),
+                (false, false) => {
+                    let mut left = slot.categories.take().unwrap_or_else(|| declared.clone());
+                    left.retain(|c| !categories.contains(c));
+                    Some(left)
+                }
             };
         }
         Ok((Record { status, data: Vec::new() }, expected))
@@ -515,19 +526,23 @@ impl<'a> Machine<'a> {
         Ok((Record { status, data: Vec::new() }, expected))
     }
 
-    fn serialize(&mut self, slot: usize, store: usize, mutation: crate::call::Mutation) -> Answer {
+    fn serialize(&mut self, slot: usize, store: usize, mutation: Mutation) -> Answer {
         let declared = self.fmu.description.serialises;
         let mut expected = self.rule(slot, Function::FmuState);
         if !declared || self.stores[store].known.is_none() {
             expected = Expected::error();
         }
         let handle = self.handle(slot);
-        let (status, mut bytes) = self.fmu.api.serialize(handle, &self.stores[store].state);
+        let surplus = if let Mutation::WrongSize(surplus) = mutation { surplus } else { 0 };
+        let (status, mut bytes) = self.fmu.api.serialize(handle, &self.stores[store].state, surplus);
+        if surplus != 0 {
+            return Ok((Record { status, data: Vec::new() }, Expected::error()));
+        }
         if status != OK {
             return Ok((Record { status, data: Vec::new() }, expected));
         }
         let whole = bytes.clone();
-        mutation.apply(&mut bytes);
+        mutation.apply(&mut bytes, &self.fmu.foreign);
         let (status, mut state) = self.fmu.api.deserialize(handle, &bytes);
         if bytes != whole {
             expected = Expected::error();
@@ -548,6 +563,24 @@ impl<'a> Machine<'a> {
         Ok((Record { status, data: Vec::new() }, expected))
     }
 
+    /// Questions about the last step: steps are done when they return, so only two have an answer.
+    fn inquire(&mut self, slot: usize, inquiry: Inquiry, kind: i32, null: bool) -> Answer {
+        let (rule, known) = (self.rule(slot, Function::Inquiry), self.known(slot));
+        let expected = match (inquiry, kind) {
+            (Inquiry::InputDerivatives | Inquiry::OutputDerivatives, _) => Expected::error(),
+            (Inquiry::Real, 2) | (Inquiry::Boolean, 3) if null => Expected::error(),
+            (Inquiry::Real, 2) | (Inquiry::Boolean, 3) => rule,
+            _ if rule.allows(OK) => Expected::discard(),
+            _ => rule,
+        };
+        let answer = if inquiry == Inquiry::Real { known.map_or(0, |known| known.time.to_bits()) } else { 0 };
+        let (status, bits) = self.fmu.api.inquire(self.handle(slot), inquiry, kind, null);
+        if status == OK && bits != answer {
+            return Err(format!("the answer is {bits:x}, {answer:x} is right"));
+        }
+        Ok((Record { status, data: Vec::new() }, expected))
+    }
+
     /// An offence of a reference that does not exist.
     pub(crate) fn unknown(reference: u32) -> Offence {
         Offence::error(vec![reference.to_string()])
@@ -558,7 +591,13 @@ impl Drop for Machine<'_> {
     fn drop(&mut self) {
         let spare =
             if self.stores.iter().any(|s| !s.state.is_null()) && self.slots.iter().all(Option::is_none) {
-                self.fmu.api.instantiate(Interface::CoSimulation, &self.fmu.token).ok()
+                {
+                    let interface = match self.fmu.description.version {
+                        Version::Fmi2 => Interface::CoSimulation2,
+                        Version::Fmi3 => Interface::CoSimulation,
+                    };
+                    self.fmu.api.instantiate(interface, &self.fmu.token).ok()
+                }
             } else {
                 None
             };

@@ -1,7 +1,7 @@
-//! Random sequences of FMI 3.0 calls against an FMU.
+//! Random sequences of FMI calls against an FMU of FMI 2.0 or 3.0.
 //!
 //! ```text
-//! fmu-fuzz FMU [--sequences N] [--seconds S] [--seed S] [--limit S] [--library FILE] [--keep I,J,...]
+//! fmu-fuzz FMU [--sequences N] [--seconds S] [--seed S] [--limit S] [--library FILE] [--other FMU] [--keep I,J,...]
 //! ```
 //! Every sequence comes from a number, `--seed` and those after it. It uses up to three instances (Model Exchange,
 //! Co-Simulation with and without Event Mode) and three saved states, in and out of phase, with values that break things.
@@ -12,8 +12,7 @@
 //! The sequences run in a process of their own, so that one that crashes is reported too. A failure is printed with
 //! the calls it needs and the command that repeats it (`--seed` with `--keep`).
 //!
-//! Other versions of the interface: their functions beside those of [`api`], their rows in [`standard`], their
-//! interfaces in [`generate`]; machine and check stay.
+//! `--other` is an FMU of another model: its serialised state has to be refused.
 
 #![allow(rustdoc::private_intra_doc_links, reason = "a program")]
 
@@ -114,10 +113,11 @@ fn folder() -> std::path::PathBuf {
 fn work(options: &Options) -> Result<bool, FuzzError> {
     watchdog::start(Duration::from_secs(options.limit));
     let (description, library) = archive::open(&options.fmu, options.library.as_deref(), &folder())?;
-    let api = Api::load(&library);
+    let api = Api::load(&library, description.version);
+    let foreign = options.other.as_deref().map_or(Ok(Vec::new()), foreign_state)?;
     let _ = fs::remove_dir_all(folder()); // the open library stays
     let token = CString::new(description.token.clone())?;
-    let fmu = Fmu { api: api?, description, token };
+    let fmu = Fmu { api: api?, description, token, foreign };
     let begin = Instant::now();
     let (mut total, mut done) = (Counts::default(), 0);
     while options.sequences.is_none_or(|n| done < n)
@@ -150,13 +150,29 @@ fn work(options: &Options) -> Result<bool, FuzzError> {
         done += 1;
     }
     say(&format!(
-        "{}: {done} sequences, {} calls, {} of them refused, {:.1} s",
+        "{} {:?}: {done} sequences, {} calls, {} of them refused, {:.1} s",
         fmu.description.identifier,
+        fmu.description.version,
         total.calls,
         total.refused,
         begin.elapsed().as_secs_f64()
     ));
     Ok(true)
+}
+
+/// The serialised state of another FMU, just made.
+fn foreign_state(path: &std::path::Path) -> Result<Vec<u8>, FuzzError> {
+    let (description, library) = archive::open(path, None, &folder().join("other"))?;
+    let api = Api::load(&library, description.version)?;
+    let token = CString::new(description.token.clone())?;
+    let interfaces = standard::Interface::of(description.version);
+    let instance = interfaces.last().and_then(|interface| api.instantiate(*interface, &token).ok());
+    let mut state = api::SavedState::NONE;
+    api.save(instance.as_ref(), &mut state);
+    let (_, bytes) = api.serialize(instance.as_ref(), &state, 0);
+    api.free_state(instance.as_ref(), &mut state);
+    api.free(instance);
+    Ok(bytes)
 }
 
 /// Every second sequence looks at everything when states are saved and restored.

@@ -7,7 +7,7 @@ use std::process::Command;
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum OptionsError {
     #[error(
-        "usage: fmu-fuzz FMU [--sequences N] [--seconds S] [--seed S] [--limit S] [--library FILE] [--keep I,J,...]"
+        "usage: fmu-fuzz FMU [--sequences N] [--seconds S] [--seed S] [--limit S] [--library FILE] [--other FMU] [--keep I,J,...]"
     )]
     Usage,
     #[error("{option}: {value} is no value for it")]
@@ -20,6 +20,8 @@ pub(crate) struct Options {
     pub(crate) fmu: PathBuf,
     /// Another library than the one inside
     pub(crate) library: Option<PathBuf>,
+    /// FMU of another model, whose states have to be refused
+    pub(crate) other: Option<PathBuf>,
     /// First sequence
     pub(crate) seed: u64,
     /// Ends: after so many sequences, after so much time [s]
@@ -42,6 +44,7 @@ impl Options {
         let mut options = Self {
             fmu: PathBuf::new(),
             library: None,
+            other: None,
             seed: 0,
             sequences: None,
             seconds: None,
@@ -58,6 +61,7 @@ impl Options {
             let value = arguments.next().ok_or(OptionsError::Usage)?;
             match argument.as_str() {
                 "--library" => options.library = Some(value.into()),
+                "--other" => options.other = Some(value.into()),
                 "--seed" => options.seed = read(&argument, &value)?,
                 "--sequences" => options.sequences = Some(read(&argument, &value)?),
                 "--seconds" => options.seconds = Some(read(&argument, &value)?),
@@ -93,8 +97,10 @@ impl Options {
         option("--seconds", self.seconds.map(|s| s.to_string()));
         let list = |kept: &Vec<usize>| kept.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
         option("--keep", self.keep.as_ref().map(list));
-        if let Some(library) = &self.library {
-            command.arg("--library").arg(library);
+        for (name, file) in [("--library", &self.library), ("--other", &self.other)] {
+            if let Some(file) = file {
+                command.arg(name).arg(file);
+            }
         }
         Ok(command)
     }

@@ -1,9 +1,18 @@
-//! FMI 3.0 as a judge: which function may be called in which state, and which variables may be set there.
+//! FMI 2.0 and 3.0 as a judge: which function may be called in which state, and which variables may be set there.
 //!
-//! Written from the standard (FMI 3.0, sections 2.3, 3.2 and 4.2: "Allowed Function Calls" of each state; 2.4.7 for
-//! variabilities), not from the product. Where the standard leaves a call open, both answers are right.
+//! Written from the standards (FMI 3.0.2, sections 2.3, 3.2 and 4.2: "Allowed Function Calls" of each state; 2.4.7 for
+//! variabilities. FMI 2.0.5, the tables at the end of 3.2.3 and 4.2.4), not from the product. Where the standard leaves a
+//! call open, both answers are right.
 
 use crate::description::{Causality, Initial, Variable};
+
+/// Version of the interface.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Version {
+    Fmi2,
+    #[default]
+    Fmi3,
+}
 
 /// How an instance is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,6 +22,31 @@ pub(crate) enum Interface {
     CoSimulationWithEvents,
     /// eventModeUsed = false
     CoSimulation,
+    /// FMI 2.0
+    ModelExchange2,
+    /// FMI 2.0
+    CoSimulation2,
+}
+
+impl Interface {
+    pub(crate) fn version(self) -> Version {
+        match self {
+            Self::ModelExchange2 | Self::CoSimulation2 => Version::Fmi2,
+            _ => Version::Fmi3,
+        }
+    }
+
+    pub(crate) fn is_model_exchange(self) -> bool {
+        matches!(self, Self::ModelExchange | Self::ModelExchange2)
+    }
+
+    /// All of a version.
+    pub(crate) fn of(version: Version) -> &'static [Self] {
+        match version {
+            Version::Fmi2 => &[Self::ModelExchange2, Self::CoSimulation2],
+            Version::Fmi3 => &[Self::ModelExchange, Self::CoSimulationWithEvents, Self::CoSimulation],
+        }
+    }
 }
 
 /// State of the state machine.
@@ -56,8 +90,11 @@ pub(crate) enum Function {
     SetTime,
     SetContinuousStates,
     CompletedIntegratorStep,
-    /// States, derivatives, nominals, indicators
+    /// States, derivatives, indicators
     ContinuousLists,
+    Nominals,
+    /// What FMI 2.0 answers about the last step
+    Inquiry,
     /// Numbers of states and indicators
     ContinuousCounts,
     /// Structural parameters, adjoint derivatives, clocks: nothing of it is declared
@@ -86,15 +123,43 @@ fn row(function: Function) -> [&'static str; 4] {
         Function::SetTime | Function::SetContinuousStates | Function::CompletedIntegratorStep => {
             ["C", "", "", ""]
         }
-        Function::ContinuousLists => ["NECT", "", "", ""],
+        Function::ContinuousLists | Function::Nominals => ["NECT", "", "", ""],
         Function::ContinuousCounts => ["IE", "", "", "NCT"],
-        Function::Undeclared => ["", "", "", ""],
+        Function::Undeclared | Function::Inquiry => ["", "", "", ""],
+    }
+}
+
+/// The same in FMI 2.0: Model Exchange, Co-Simulation (stepComplete is Step), states left open in both.
+#[allow(clippy::match_same_arms, reason = "one row per function")]
+fn row2(function: Function) -> [&'static str; 3] {
+    match function {
+        Function::SetDebugLogging | Function::Reset | Function::FmuState => ["INECT", "INST", ""],
+        Function::EnterInitialization => ["I", "I", ""],
+        Function::ExitInitialization => ["N", "N", ""],
+        Function::EnterEventMode => ["EC", "", ""],
+        Function::UpdateDiscreteStates => ["E", "", ""],
+        Function::EnterContinuousTimeMode => ["E", "", ""],
+        Function::DoStep => ["", "S", ""],
+        Function::Terminate => ["EC", "S", ""],
+        Function::Get => ["NECT", "NST", ""],
+        Function::Set => ["INEC", "INS", ""],
+        Function::DirectionalDerivative => ["NECT", "NS", "T"], // terminated: in Model Exchange only
+        // note 8, SetTime in Event Mode: FMUs without continuous time only
+        Function::SetTime | Function::SetContinuousStates | Function::CompletedIntegratorStep => {
+            ["C", "", ""]
+        }
+        Function::ContinuousLists => ["NECT", "", ""],
+        Function::Nominals => ["INECT", "", ""],
+        Function::Inquiry => ["", "ST", ""],
+        Function::EnterStepMode
+        | Function::Dependencies
+        | Function::ContinuousCounts
+        | Function::Undeclared => ["", "", ""],
     }
 }
 
 /// May `function` be called?
 pub(crate) fn may(function: Function, interface: Interface, phase: Phase) -> Verdict {
-    let [exchange, events, plain, open] = row(function);
     let letter = match phase {
         Phase::Instantiated => 'I',
         Phase::Initialization => 'N',
@@ -103,12 +168,17 @@ pub(crate) fn may(function: Function, interface: Interface, phase: Phase) -> Ver
         Phase::ContinuousTime => 'C',
         Phase::Terminated => 'T',
     };
-    let allowed = match interface {
-        Interface::ModelExchange if open.contains(letter) => return Verdict::Open,
-        Interface::ModelExchange => exchange,
-        Interface::CoSimulationWithEvents => events,
-        Interface::CoSimulation => plain,
+    let ([exchange, events, plain, open], [exchange2, plain2, open2]) = (row(function), row2(function));
+    let (allowed, open) = match interface {
+        Interface::ModelExchange => (exchange, open),
+        Interface::CoSimulationWithEvents => (events, ""),
+        Interface::CoSimulation => (plain, ""),
+        Interface::ModelExchange2 => (exchange2, open2),
+        Interface::CoSimulation2 => (plain2, open2),
     };
+    if open.contains(letter) {
+        return Verdict::Open;
+    }
     if allowed.contains(letter) { Verdict::Allowed } else { Verdict::Forbidden }
 }
 
@@ -119,16 +189,14 @@ pub(crate) fn may_set(variable: &Variable, interface: Interface, phase: Phase) -
     let continuous_input = input && variable.continuous;
     let tunable = variable.causality == Causality::Parameter && variable.tunable;
     let allowed = match phase {
+        // "this does not include inputs as they do not have an initial attribute", but hosts set their start values
+        Phase::Instantiated if input && interface.version() == Version::Fmi2 => return Verdict::Open,
         Phase::Instantiated => variable.initial != Initial::Calculated,
-        // only initial = exact is named, but guesses are made here
-        Phase::Initialization if variable.initial == Initial::Approx => return Verdict::Open,
         Phase::Initialization => variable.initial == Initial::Exact,
         Phase::Event => input || tunable,
-        Phase::Step if interface == Interface::CoSimulation => input || tunable,
-        Phase::Step => continuous_input,
-        // states may be set one by one, but they are no inputs and have no initial = exact in general
-        Phase::ContinuousTime if variable.state => return Verdict::Open,
-        Phase::ContinuousTime => continuous_input,
+        Phase::Step if interface == Interface::CoSimulationWithEvents => continuous_input,
+        Phase::Step => input || tunable,
+        Phase::ContinuousTime => continuous_input || variable.state,
         Phase::Terminated => false,
     };
     if allowed { Verdict::Allowed } else { Verdict::Forbidden }
@@ -138,7 +206,11 @@ pub(crate) fn may_set(variable: &Variable, interface: Interface, phase: Phase) -
 pub(crate) fn after(function: Function, interface: Interface) -> Option<Phase> {
     Some(match function {
         Function::EnterInitialization => Phase::Initialization,
-        Function::ExitInitialization if interface == Interface::CoSimulation => Phase::Step,
+        Function::ExitInitialization
+            if matches!(interface, Interface::CoSimulation | Interface::CoSimulation2) =>
+        {
+            Phase::Step
+        }
         Function::ExitInitialization | Function::EnterEventMode => Phase::Event,
         Function::EnterStepMode => Phase::Step,
         Function::EnterContinuousTimeMode => Phase::ContinuousTime,

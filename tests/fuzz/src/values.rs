@@ -10,15 +10,17 @@ use crate::description::{Causality, Kind, Variable};
 use crate::expect::{Expected, Offence};
 use crate::machine::{Answer, Machine, Record};
 use crate::random::Random;
-use crate::standard::{self, Function, Phase, Verdict};
+use crate::standard::{self, Function, Phase, Verdict, Version};
 
 impl Access {
     pub(crate) const ALL: [Self; 5] = [Self::Float64, Self::Int32, Self::Int64, Self::Boolean, Self::Float32];
 
-    pub(crate) fn of(kind: Kind) -> Self {
+    /// How values of a type go through the interface.
+    pub(crate) fn of(kind: Kind, version: Version) -> Self {
         match kind {
             Kind::Float64 => Self::Float64,
             Kind::Int32 => Self::Int32,
+            Kind::Enumeration if version == Version::Fmi2 => Self::Int32,
             Kind::Int64 | Kind::Enumeration => Self::Int64,
             Kind::Boolean => Self::Boolean,
         }
@@ -44,10 +46,10 @@ impl Access {
 }
 
 impl Mutation {
-    pub(crate) fn apply(self, bytes: &mut Vec<u8>) {
+    pub(crate) fn apply(self, bytes: &mut Vec<u8>, foreign: &[u8]) {
         let length = bytes.len().max(1);
         match self {
-            Self::None => {}
+            Self::None | Self::WrongSize(_) => {}
             Self::Flip(place) => {
                 if let Some(byte) = bytes.get_mut(place % length) {
                     *byte ^= 1 << (place / length % 8);
@@ -55,6 +57,7 @@ impl Mutation {
             }
             Self::Cut(n) => bytes.truncate(n % length),
             Self::Longer(n) => bytes.extend(std::iter::repeat_n(0, n % 64 + 1)),
+            Self::Foreign => *bytes = foreign.to_vec(),
             Self::Noise(n) => {
                 let mut random = Random::new(n as u64);
                 *bytes = (0..n % 4096).map(|_| random.bits().to_le_bytes()[0]).collect();
@@ -89,6 +92,10 @@ fn all_finite(what: &str, values: &[f64]) -> Result<Vec<u64>, String> {
 }
 
 impl Machine<'_> {
+    fn access(&self, variable: &Variable) -> Access {
+        Access::of(variable.kind, self.fmu.description.version)
+    }
+
     fn variable(&self, reference: u32) -> Option<&Variable> {
         self.fmu.description.variables.get(reference as usize)
     }
@@ -121,7 +128,7 @@ impl Machine<'_> {
         references
             .filter_map(|reference| match self.variable(reference) {
                 None => Some(Self::unknown(reference)),
-                Some(v) if Access::of(v.kind) != access => Some(Offence::error(vec![v.name.clone()])),
+                Some(v) if self.access(v) != access => Some(Offence::error(vec![v.name.clone()])),
                 Some(_) => None,
             })
             .collect()
@@ -152,6 +159,9 @@ impl Machine<'_> {
     /// Statuses of reading values that may have to be computed first.
     fn reading(&self, slot: usize, computes: bool) -> Expected {
         let phase = self.known(slot).map(|known| known.phase);
+        if !self.rule(slot, Function::Get).allows(OK) {
+            return Expected::error();
+        }
         match phase {
             _ if !computes => Expected::ok(),
             Some(Phase::Instantiated) => Expected::ok().or(ERROR), // there is no value yet
@@ -214,7 +224,7 @@ impl Machine<'_> {
             let (Some(variable), Some(known)) = (self.variable(*reference), self.known(slot)) else {
                 continue;
             };
-            if Access::of(variable.kind) != access {
+            if self.access(variable) != access {
                 continue;
             }
             match standard::may_set(variable, known.interface, known.phase) {
@@ -261,12 +271,17 @@ impl Machine<'_> {
     }
 
     pub(crate) fn get_list(&mut self, slot: usize, list: Lists, spoil: Spoil) -> Answer {
-        let mut expected = self.rule(slot, Function::ContinuousLists);
+        let function = if list == Lists::Nominals { Function::Nominals } else { Function::ContinuousLists };
+        let mut expected = self.rule(slot, function);
         let length = self.list_length(list);
         let n = spoilt_length(length, spoil);
         if expected.allows(OK) {
             let null = matches!(spoil, Spoil::NullReferences | Spoil::NullValues) && n > 0;
-            expected = if n != length || null { Expected::error() } else { self.reading(slot, true) };
+            expected = match (n != length || null, list) {
+                (true, _) => Expected::error(),
+                (false, Lists::Nominals) => expected.or(DISCARD).or(ERROR),
+                (false, _) => self.reading(slot, true),
+            };
         }
         let mut values = vec![f64::NAN; n];
         let null = matches!(spoil, Spoil::NullReferences | Spoil::NullValues);
@@ -379,7 +394,7 @@ impl Machine<'_> {
         let mut seen = Vec::new();
         let Some(known) = self.known(slot) else { return Ok(seen) };
         for (variable, reference) in self.fmu.description.variables.iter().zip(0_u32..) {
-            let access = Access::of(variable.kind);
+            let access = self.access(variable);
             let (status, data) = self.call_get(slot, access, &[reference], Spoil::Nothing);
             if !self.reading(slot, computed(variable)).allows(status) {
                 return Err(format!("reading {} is {}", variable.name, fmi_capi::status_name(status)));

@@ -291,7 +291,7 @@ macro_rules! no_variables {
                 #[unsafe(no_mangle)]
                 pub unsafe extern "C" fn $name(instance: *mut c_void, vr: *const u32, n: usize, values: $type, n_values: usize) -> Status {
                     // SAFETY: the arguments as the host passes them.
-                    unsafe { fmi3::no_variables::<$model>(instance, $get, $called, vr, n) }
+                    unsafe { fmi3::no_variables::<$model>(instance, $get, $called, vr, n, n_values) }
                 }
             )*
         }

@@ -199,7 +199,7 @@ pub unsafe fn fmi2GetString<M: Model>(
     _values: *mut *const c_char,
 ) -> Status {
     // SAFETY: the arguments as the host passes them.
-    unsafe { shared::no_variables::<M>(instance, &phase::GET_STRING, "String", references, n) }
+    unsafe { shared::no_variables::<M>(instance, &phase::GET_STRING, "String", (references, n), n) }
 }
 
 #[doc(hidden)]
@@ -210,7 +210,7 @@ pub unsafe fn fmi2SetString<M: Model>(
     _values: *const *const c_char,
 ) -> Status {
     // SAFETY: the arguments as the host passes them.
-    unsafe { shared::no_variables::<M>(instance, &phase::SET_STRING, "String", references, n) }
+    unsafe { shared::no_variables::<M>(instance, &phase::SET_STRING, "String", (references, n), n) }
 }
 
 #[doc(hidden)]

@@ -245,10 +245,11 @@ pub unsafe fn no_variables<M: Model>(
     called: &'static str,
     references: *const u32,
     n: usize,
+    n_values: usize,
 ) -> Status {
     let rule = if get { &phase::GET_OTHER } else { &phase::SET_OTHER };
     // SAFETY: the arguments as the host passes them.
-    unsafe { shared::no_variables::<M>(instance, rule, called, references, n) }
+    unsafe { shared::no_variables::<M>(instance, rule, called, (references, n), n_values) }
 }
 
 #[doc(hidden)]

@@ -29,11 +29,12 @@ pub(super) enum Callback {
     Fmi3(Option<LogMessage>),
 }
 
-/// Where messages go. Messages about refusals are always sent; a list of categories filters them.
+/// Where messages go: all of them, until the host switches categories off or asks for some only.
 pub(super) struct Log {
     environment: *mut c_void,
     callback: Callback,
-    categories: Option<Vec<CString>>,
+    /// Switched on; `None`: all
+    categories: Option<Vec<&'static CStr>>,
 }
 
 impl Log {
@@ -42,27 +43,29 @@ impl Log {
         Self { environment, callback, categories: None }
     }
 
-    /// Only messages of these categories; `None`: all.
+    /// Switch categories on or off, all without names (FMI 3.0, 2.3.1: only those are sent that are switched on).
     ///
     /// # Errors
-    /// A category that is not declared.
-    pub(super) fn choose(&mut self, names: Option<Vec<String>>) -> Result<(), Fault> {
-        let known = |name: String| {
-            let mut names = LOG_CATEGORIES.iter().map(|(name, _)| *name);
-            names.find(|known| known.to_bytes() == name.as_bytes()).map(CStr::to_owned).ok_or(
-                Fault::Unsupported {
-                    function: "this log category",
-                    reason: "see LogCategories in the model description",
-                },
-            )
+    /// A category that is not declared; then nothing is switched.
+    pub(super) fn choose(&mut self, on: bool, names: &[String]) -> Result<(), Fault> {
+        let named = names.iter().map(|name| known(name)).collect::<Result<Vec<_>, _>>()?;
+        let all = || LOG_CATEGORIES.map(|(name, _)| name).to_vec();
+        self.categories = match (on, named.is_empty()) {
+            (true, true) => None,
+            (false, true) => Some(Vec::new()),
+            (true, false) => Some([self.categories.take().unwrap_or_default(), named].concat()),
+            (false, false) => {
+                let mut left = self.categories.take().unwrap_or_else(all);
+                left.retain(|category| !named.contains(category));
+                Some(left)
+            }
         };
-        self.categories = names.map(|names| names.into_iter().map(known).collect()).transpose()?;
         Ok(())
     }
 
     pub(super) fn send(&self, status: Status, category: &CStr, message: &str) {
         if let Some(chosen) = &self.categories
-            && !chosen.iter().any(|c| c.as_c_str() == category)
+            && !chosen.contains(&category)
         {
             return;
         }
@@ -87,13 +90,46 @@ impl Log {
             Status::Fatal => FATAL_CATEGORY,
             _ => ERROR_CATEGORY,
         };
-        let separator = if function.is_empty() { "" } else { ": " };
-        self.send(status, category, &format!("{function}{separator}{fault}"));
+        self.send(status, category, &format!("{function}: {fault}"));
     }
 
     /// There is no instance: null with a message.
     pub(super) fn refusal(&self, function: &str, message: &str) -> *mut c_void {
         self.send(Status::Error, ERROR_CATEGORY, &format!("{function}: {message}"));
         std::ptr::null_mut()
+    }
+}
+
+/// The declared category of this name.
+fn known(name: &str) -> Result<&'static CStr, Fault> {
+    let names = LOG_CATEGORIES.map(|(name, _)| name);
+    names.into_iter().find(|known| known.to_bytes() == name.as_bytes()).ok_or_else(|| Fault::LogCategory {
+        name: name.into(),
+        declared: names.map(CStr::to_string_lossy).join(", "),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The example of FMI 3.0, 2.3.1, and its other cases.
+    #[test]
+    fn categories_are_switched_on_and_off() {
+        let mut log = Log::new(std::ptr::null_mut(), Callback::Fmi3(None));
+        let mut after = |on, names: &[&str]| {
+            let names: Vec<_> = names.iter().map(ToString::to_string).collect();
+            log.choose(on, &names).map(|()| log.categories.as_ref().map(Vec::len))
+        };
+        assert_eq!(after(false, &[]), Ok(Some(0)));
+        assert_eq!(after(true, &["logStatusFatal"]), Ok(Some(1)));
+        assert_eq!(after(true, &["logStatusError"]), Ok(Some(2)));
+        assert_eq!(after(false, &["logStatusFatal"]), Ok(Some(1)));
+        assert_eq!(after(true, &[]), Ok(None));
+        assert_eq!(after(false, &["logStatusFatal"]), Ok(Some(LOG_CATEGORIES.len() - 1)));
+        let message = after(true, &["logAll"]).map_err(|fault| fault.to_string());
+        assert!(
+            message.is_err_and(|text| text.starts_with("\"logAll\" is no log category; declared: logStatus"))
+        );
     }
 }

@@ -106,7 +106,7 @@ macro_rules! whole_numbers {
 
 pub(super) use {forward, lists, methods, whole_numbers};
 
-/// Choose log categories: none, or all that are declared.
+/// Switch log categories on or off: those named, or all.
 pub(super) unsafe fn set_debug_logging<M: Model>(
     instance: *mut c_void,
     rule: &Rule,
@@ -117,12 +117,8 @@ pub(super) unsafe fn set_debug_logging<M: Model>(
     // SAFETY: FMI pointers, checked for null by `call`, `array` and `text`.
     unsafe {
         call::<M>(instance, rule, |c| {
-            let names = array("categories", categories, n)?.iter().map(|name| text(*name)).collect();
-            c.log.choose((n > 0).then_some(names))?;
-            if !on {
-                c.log.choose(None)?;
-            }
-            Ok(())
+            let names: Vec<_> = array("categories", categories, n)?.iter().map(|name| text(*name)).collect();
+            c.log.choose(on, &names)
         })
     }
 }
@@ -218,13 +214,14 @@ pub(super) unsafe fn no_variables<M: Model>(
     instance: *mut c_void,
     rule: &Rule,
     called: &'static str,
-    references: *const u32,
-    n: usize,
+    (references, n): (*const u32, usize),
+    n_values: usize,
 ) -> Status {
     // SAFETY: FMI pointers, checked for null.
     unsafe {
         call::<M>(instance, rule, |c| {
             let references = array("valueReferences", references, n)?;
+            crate::values::same_length(n, n_values)?;
             c.instance.get_whole(references, called, |_| false, |_, _| true)
         })
     }
@@ -357,5 +354,5 @@ pub(super) unsafe fn unsupported<M: Model>(
     reason: &'static str,
 ) -> Status {
     // SAFETY: FMI instance, checked for null by `call`.
-    unsafe { call::<M>(instance, rule, |_| Err(Fault::Unsupported { function, reason })) }
+    unsafe { call::<M>(instance, &rule.named(function), |_| Err(Fault::Unsupported { reason })) }
 }
