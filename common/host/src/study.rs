@@ -343,11 +343,11 @@ impl Bench<'_> {
 
 fn status(error: &Error) -> String {
     let text = error.to_string();
-    let line = text.lines().next().unwrap_or_default();
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     match error {
         Error::Scene(_) => format!("not applicable: {line}"),
         Error::Run(RunError::NotFinite { t, .. }) => format!("diverged at t = {t:.4} s: {line}"),
-        Error::Run(RunError::Diverged { .. }) => line.to_owned(),
+        Error::Run(RunError::Diverged { .. }) => line,
         _ => format!("failed: {line}"),
     }
 }
