@@ -171,9 +171,27 @@ fn a_study_of_true_forces_diverges_and_closing_joints_refuse_plain_exchange() {
 }
 
 #[test]
+fn an_archive_holds_its_reference() {
+    fmus();
+    let folder = tempfile::tempdir().unwrap();
+    let archive = folder.path().join("pendulum.ssp");
+    let archive = archive.to_str().unwrap();
+    assert_eq!(code(&["pack", PENDULUM, "--output", archive]), 0);
+    let options = ["--references", "nowhere", "--runs", "1", "--stop", "0.02"];
+    assert_eq!(code(&[&["study", archive], &options[..]].concat()), 0);
+    let refused = koppel(&[&["study", PENDULUM], &options[..]].concat());
+    assert_eq!(refused.status.code(), Some(3));
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(
+        said.contains("reference extra/coupling/double_pendulum.csv is neither in the scene nor"),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_study_with_other_parameters_makes_its_reference() {
     fmus();
-    let options = ["--runs", "1", "--stop", "0.1", "--set", "upper.mass=2", "--json"];
+    let options = ["--runs", "1", "--stop", "0.02", "--set", "upper.mass=2", "--json"];
     let study = json(&koppel(&[&["study", PENDULUM], &options[..]].concat()));
     assert!(study["reference"].as_str().unwrap().starts_with("common dop853 and dopri5 at 1e-12, apart by "));
 }

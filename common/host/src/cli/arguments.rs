@@ -180,4 +180,7 @@ pub(super) struct Pack {
     /// Folder of FMUs that the scene does not hold
     #[arg(long, default_value = "dist/fmi3")]
     pub(super) fmus: PathBuf,
+    /// Folder of reference files that the scene does not hold
+    #[arg(long, default_value = "tests/reference")]
+    pub(super) references: PathBuf,
 }

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use crate::record::Recorder;
-use crate::ssp::Package;
+use crate::ssp::{Package, outside_reference};
 
 /// Times that differ by less are one [s].
 const SAME_TIME: f64 = 1e-9;
@@ -95,7 +95,7 @@ impl Reference {
         accuracy: f64,
     ) -> Result<Self, ReferenceError> {
         let content = package.read(file).or_else(|_| {
-            let outside = fallback.join(Path::new(file).components().skip(1).collect::<PathBuf>());
+            let outside = outside_reference(fallback, file);
             std::fs::read(&outside).map_err(|_| ReferenceError::Missing { file: file.into(), outside })
         })?;
         Self::parse(&String::from_utf8_lossy(&content), file, accuracy)
