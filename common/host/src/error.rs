@@ -110,6 +110,16 @@ pub enum RunError {
         /// What it became
         value: f64,
     },
+    /// A signal has run away
+    #[error("diverged at t = {t:.4} s: {signal} = {value:.3e}")]
+    Diverged {
+        /// Time [s]
+        t: f64,
+        /// Component and variable
+        signal: String,
+        /// What it became
+        value: f64,
+    },
     /// Events without end
     #[error("t = {t:.6} s: the FMUs ask for updates of their discrete states without end ({passes} passes)")]
     EventLoop {

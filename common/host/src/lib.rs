@@ -8,6 +8,7 @@
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "units stand in brackets")]
 
+pub mod audit;
 pub mod cli;
 pub mod closure;
 pub mod error;

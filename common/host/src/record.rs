@@ -35,12 +35,12 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Records the scene's variables.
+    /// Records the scene's variables and then `further` ones.
     #[must_use]
-    pub fn new(network: &Network, interval: Option<f64>) -> Self {
+    pub fn new(network: &Network, further: &[Recorded], interval: Option<f64>) -> Self {
         let mut blocks: Vec<Block> = Vec::new();
         let mut others = Vec::new();
-        for (column, recorded) in network.recorded.iter().enumerate() {
+        for (column, recorded) in network.recorded.iter().chain(further).enumerate() {
             if recorded.kind != VariableKind::Real {
                 others.push((column, recorded.clone()));
                 continue;
@@ -53,7 +53,7 @@ impl Recorder {
             blocks[place].columns.push(column);
         }
         Self {
-            names: network.recorded.iter().map(|r| r.name.clone()).collect(),
+            names: network.recorded.iter().chain(further).map(|r| r.name.clone()).collect(),
             times: Vec::new(),
             rows: Vec::new(),
             blocks,

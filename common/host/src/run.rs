@@ -120,6 +120,23 @@ impl Scene {
     /// A recorder for the scene's variables.
     #[must_use]
     pub fn recorder(&self, config: &Config) -> Recorder {
-        Recorder::new(&self.network, config.interval)
+        Recorder::new(&self.network, &[], config.interval)
+    }
+
+    /// What a run may be made with but probably is not meant to be.
+    #[must_use]
+    pub fn warnings(&self, config: &Config) -> Vec<String> {
+        let Some(step) = config.step.filter(|_| config.is_fixed_step() && !self.network.joints.is_empty())
+        else {
+            return Vec::new();
+        };
+        let product = config.alpha * step;
+        // a step that is 1/alpha by its digits may be a last bit above
+        if product <= 1.0 + 1e-9 {
+            return Vec::new();
+        }
+        vec![format!(
+            "alpha H = {product} is above 1: the closing joints are stabilised faster than the steps can follow"
+        )]
     }
 }

@@ -78,6 +78,8 @@ pub struct Sweeper {
     /// A component has discrete outputs that others take
     pub sampled: bool,
     signal_names: Vec<String>,
+    /// Magnitudes beyond which a signal has run away
+    bounds: Vec<f64>,
     joint_of: Vec<String>,
     inputs: Vec<Input>,
     /// What the FMUs hold; NaN: not known
@@ -159,6 +161,7 @@ impl Sweeper {
             motion: (0..network.signals.len()).filter(|&s| network.is_motion(s)).collect(),
             sampled: (0..network.signals.len()).any(|s| network.is_discrete(s)),
             signal_names: (0..network.signals.len()).map(|s| network.signal_name(s)).collect(),
+            bounds: network.signals.iter().map(|s| ports::RUN_AWAY * s.nominal).collect(),
             joint_of: network.joints.iter().flat_map(joint_name).collect(),
             held: vec![f64::NAN; inputs.len()],
             inputs,

@@ -59,9 +59,9 @@ fn a_scene_in_an_archive_gives_the_same_numbers() {
     let folder = tempfile::tempdir().unwrap();
     let archive = folder.path().join("double_pendulum.ssp");
     let source = root().join("scenes/double_pendulum");
-    host::ssp::pack(&source, &fmus(), &archive).unwrap();
+    host::ssp::pack(&source, &fmus(), &root().join("tests/reference"), &archive).unwrap();
     let first = std::fs::read(&archive).unwrap();
-    host::ssp::pack(&source, &fmus(), &archive).unwrap();
+    host::ssp::pack(&source, &fmus(), &root().join("tests/reference"), &archive).unwrap();
     assert_eq!(std::fs::read(&archive).unwrap(), first, "packing twice gives the same bytes");
     let nowhere = folder.path().join("no FMUs here");
     let packed = host::run::Scene::load(&archive, &nowhere, None).unwrap();

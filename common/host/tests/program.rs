@@ -119,16 +119,93 @@ fn a_run_that_fails_is_a_row_of_the_sweep() {
     assert_eq!(text.lines().filter(|l| l.contains("upper.mass = -1")).count(), 2);
 }
 
+/// alpha = 2 1/s: steps above half a second are too long, the tests' steps are not.
+#[test]
+fn a_step_too_long_for_the_stabilisation_is_warned_of() {
+    fmus();
+    let warned = |options: &[&str]| {
+        let output = koppel(&[&["validate", "scenes/four_bar"], options].concat());
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).unwrap().contains("alpha H = ")
+    };
+    let fixed = ["--integrator", "rk4", "--H"];
+    assert!(warned(&[&fixed[..], &["0.75"]].concat()));
+    assert!(!warned(&[&fixed[..], &["0.5"]].concat()));
+    assert!(!warned(&["--H", "0.75"]), "dopri5 chooses its steps");
+    assert!(!warned(&[&fixed[..], &["0.75", "--alpha", "1"]].concat()));
+}
+
+#[test]
+fn a_study_of_true_forces_diverges_and_closing_joints_refuse_plain_exchange() {
+    fmus();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("study.csv");
+    let study = |scene: &str, options: &[&str]| {
+        let arguments = [&["study", scene, "--runs", "1", "-o", file.to_str().unwrap(), "--json"], options];
+        json(&koppel(&arguments.concat()))["points"].as_array().unwrap().clone()
+    };
+    let of = |points: &[Value], method: &str| -> Vec<Value> {
+        points.iter().filter(|p| p["method"] == method).cloned().collect()
+    };
+    let points = study("scenes/two_mass", &["--stop", "0.5"]);
+    for point in of(&points, "raw jacobi") {
+        assert!(point["status"].as_str().unwrap().starts_with("diverged at t = "), "{point}");
+        assert!(point["e_max"].is_null());
+    }
+    // the audit sees the error of the integrator: the energies balance at its order
+    let energies: Vec<f64> =
+        of(&points, "common rk4").iter().map(|p| p["energy"].as_f64().unwrap()).collect();
+    assert!(energies[2] > 0.0 && energies[2] < energies[0] / 30.0, "{energies:?}");
+    let text = fs::read_to_string(&file).unwrap();
+    let columns = "scene,method,H,rtol,e_max,e_rms,energy,gap,wall_min,wall_median,cpu,real_time_factor,steps,rejected,evaluations,sweeps,calls,Get,Set,doStep,save,restore,order,status";
+    assert_eq!(text.lines().next(), Some(columns));
+    assert_eq!(text.lines().count(), 1 + points.len());
+
+    let points = study("scenes/four_bar", &["--stop", "0.15"]);
+    for method in ["jacobi order 0", "seidel order 1", "raw jacobi"] {
+        let refused = of(&points, method);
+        assert_eq!(refused.len(), 1);
+        assert!(refused[0]["status"].as_str().unwrap().starts_with("not applicable: "));
+    }
+    assert!(of(&points, "cs-pece order 2").iter().all(|p| p["gap"].as_f64().unwrap() > 0.0));
+}
+
+#[test]
+fn an_archive_holds_its_reference() {
+    fmus();
+    let folder = tempfile::tempdir().unwrap();
+    let archive = folder.path().join("pendulum.ssp");
+    let archive = archive.to_str().unwrap();
+    assert_eq!(code(&["pack", PENDULUM, "--output", archive]), 0);
+    let options = ["--references", "nowhere", "--runs", "1", "--stop", "0.02"];
+    assert_eq!(code(&[&["study", archive], &options[..]].concat()), 0);
+    let refused = koppel(&[&["study", PENDULUM], &options[..]].concat());
+    assert_eq!(refused.status.code(), Some(3));
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(
+        said.contains("reference extra/coupling/double_pendulum.csv is neither in the scene nor"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_study_with_other_parameters_makes_its_reference() {
+    fmus();
+    let options = ["--runs", "1", "--stop", "0.02", "--set", "upper.mass=2", "--json"];
+    let study = json(&koppel(&[&["study", PENDULUM], &options[..]].concat()));
+    assert!(study["reference"].as_str().unwrap().starts_with("common dop853 and dopri5 at 1e-12, apart by "));
+}
+
 #[test]
 fn a_study_finds_the_orders() {
     fmus();
     let study = json(&koppel(&["study", PENDULUM, "--runs", "1", "--stop", "0.5", "--json"]));
     let order = |name: &str| {
-        let orders = study["orders"].as_array().unwrap();
-        orders.iter().find(|o| o["method"] == name).unwrap()["order"].as_f64().unwrap()
+        let points = study["points"].as_array().unwrap();
+        points.iter().find(|p| p["method"] == name).unwrap()["order"].as_f64().unwrap()
     };
     for (name, expected) in [("common heun", 2.0), ("cs-predict order 1", 2.0), ("jacobi order 0", 1.0)] {
         assert!((order(name) - expected).abs() < 0.3, "{name}: {}", order(name));
     }
-    assert!(study["reference_agreement"].as_f64().unwrap() <= 1e-9);
+    assert_eq!(study["reference"], "extra/coupling/double_pendulum.csv");
 }

@@ -107,12 +107,21 @@ impl Run {
 
     /// The scene as the options want it.
     pub(super) fn scene(&self) -> Result<Scene, SceneError> {
+        self.read(self.raw)
+    }
+
+    /// The scene with true forces instead of bias force and inertia.
+    pub(super) fn raw_scene(&self) -> Result<Scene, SceneError> {
+        self.read(true)
+    }
+
+    fn read(&self, raw: bool) -> Result<Scene, SceneError> {
         let mut package = Package::open(&self.place.path)?;
         if let Some(structure) = &self.place.structure {
             package.choose(structure);
         }
         let system = package.system()?;
-        let system = if self.raw { system.raw() } else { system };
+        let system = if raw { system.raw() } else { system };
         Scene::build(package, system, &self.place.fmus)
     }
 
@@ -141,6 +150,9 @@ pub(super) struct Study {
     /// CSV file of the table
     #[arg(long, short)]
     pub(super) output: Option<PathBuf>,
+    /// Folder of reference files that the scene does not hold
+    #[arg(long, default_value = "tests/reference")]
+    pub(super) references: PathBuf,
     /// Timed runs of each point, after one that does not count
     #[arg(long, default_value_t = 7)]
     pub(super) runs: u32,
@@ -168,4 +180,7 @@ pub(super) struct Pack {
     /// Folder of FMUs that the scene does not hold
     #[arg(long, default_value = "dist/fmi3")]
     pub(super) fmus: PathBuf,
+    /// Folder of reference files that the scene does not hold
+    #[arg(long, default_value = "tests/reference")]
+    pub(super) references: PathBuf,
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs::File;
+use std::io::{self, Write as _};
 use std::path::Path;
 
 use serde_json::json;
@@ -16,6 +17,7 @@ use crate::run::{Cost, Scene};
 pub(super) fn simulate(options: &Simulate) -> Result<Answer, CommandError> {
     let scene = options.run.scene()?;
     let config = Config::new(&scene.system, &options.run.choices())?;
+    warn(&scene, &config);
     let mut recorder = scene.recorder(&config);
     let mut progress = Progress::new();
     let length = config.stop - config.start;
@@ -27,6 +29,13 @@ pub(super) fn simulate(options: &Simulate) -> Result<Answer, CommandError> {
         write(&recorder, path)?;
     }
     Ok(report(&scene, &config, &recorder, &cost))
+}
+
+/// Says on standard error what is probably not meant, before a run that may fail by it.
+pub(super) fn warn(scene: &Scene, config: &Config) {
+    for warning in scene.warnings(config) {
+        let _ = writeln!(io::stderr(), "warning: {warning}"); // nowhere else to say it
+    }
 }
 
 fn write(recorder: &Recorder, path: &Path) -> Result<(), CommandError> {
@@ -96,6 +105,7 @@ fn report(scene: &Scene, config: &Config, recorder: &Recorder, cost: &Cost) -> A
         "components": scene.network.nodes.len(),
         "variables": {"exchanged": scene.exchanged(), "available": scene.available()},
         "cost": cost,
+        "warnings": scene.warnings(config),
     });
     Answer { text, json }
 }

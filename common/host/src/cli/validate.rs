@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use super::arguments::Run;
+use super::simulate::warn;
 use super::{Answer, CommandError};
 use crate::error::Error;
 use crate::methods::Config;
@@ -11,6 +12,7 @@ use crate::start;
 pub(super) fn validate(options: &Run) -> Result<Answer, CommandError> {
     let scene = options.scene()?;
     let config = Config::new(&scene.system, &options.choices())?;
+    warn(&scene, &config);
     let mut sweeper = scene.instantiate(&config, &options.overrides()?)?;
     start::initialise(&mut sweeper, &config).map_err(Error::from)?;
     let gap = sweeper.gap().map(|(position, _, _)| position);

@@ -1,11 +1,10 @@
 //! Method `common`: the states of all FMUs in one vector, one integrator, Model Exchange.
 
 use std::ops::Range;
-use std::time::Instant;
 
 use integrators::{DynamicOde, ExplicitSolver, NotExplicit, Settings, StepError};
 
-use super::{Config, Progress, Steps, events};
+use super::{Clock, Config, Progress, Steps, events};
 use crate::error::{Error, RunError};
 use crate::import::{Fault, Status};
 use crate::record::Recorder;
@@ -26,11 +25,12 @@ pub(super) fn run(
     start::initialise(sweeper, config)?;
     let mut run = Run::start(sweeper, config)?;
     recorder.offer(run.ode.sweeper, config, run.t)?;
-    let begin = Instant::now();
+    let begin = Clock::start();
     while run.t < config.stop {
         run.step(config, recorder)?;
         progress(run.t);
     }
+    let (seconds, cpu) = begin.read();
     let statistics = run.solver.statistics;
     Ok(Steps {
         accepted: statistics.steps,
@@ -38,7 +38,8 @@ pub(super) fn run(
         rhs_evaluations: statistics.rhs_evaluations,
         events: run.events,
         gap: recorder.gap(),
-        seconds: begin.elapsed().as_secs_f64(),
+        seconds,
+        cpu,
     })
 }
 

@@ -7,11 +7,9 @@
 //! H         <- H min(2, max(0.2, 0.9 error^(-1/(k + 2))))
 //! ```
 
-use std::time::Instant;
-
 use super::exchange::do_step;
 use super::inputs::{Inputs, Treatment};
-use super::{Config, MethodKind, Progress, Steps, events};
+use super::{Clock, Config, MethodKind, Progress, Steps, events};
 use crate::error::{Error, RunError};
 use crate::import::Saved;
 use crate::record::Recorder;
@@ -53,13 +51,13 @@ pub(super) fn run(
     };
     run.update()?;
     recorder.offer(run.sweeper, config, run.t)?;
-    let begin = Instant::now();
+    let begin = Clock::start();
     let mut result = Ok(());
     while result.is_ok() && run.t < config.stop {
         result = run.advance(recorder);
         progress(run.t);
     }
-    run.steps.seconds = begin.elapsed().as_secs_f64();
+    (run.steps.seconds, run.steps.cpu) = begin.read();
     run.forget()?;
     result?;
     run.steps.gap = recorder.gap();

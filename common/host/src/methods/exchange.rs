@@ -5,10 +5,8 @@
 //! seidel   leaders before followers: set, step, get; followers take their inputs as those of the end of the step
 //! ```
 
-use std::time::Instant;
-
 use super::inputs::{Inputs, Treatment};
-use super::{Config, MethodKind, Progress, Steps};
+use super::{Clock, Config, MethodKind, Progress, Steps};
 use crate::error::{Error, RunError};
 use crate::import::{Fault, Status};
 use crate::record::Recorder;
@@ -33,7 +31,7 @@ pub(super) fn run(
     recorder.offer(sweeper, config, config.start)?;
     let mut steps = Steps::default();
     let mut t = config.start;
-    let begin = Instant::now();
+    let begin = Clock::start();
     while t < config.stop {
         steps.accepted += 1;
         let next = config.point(steps.accepted, step);
@@ -46,7 +44,7 @@ pub(super) fn run(
         recorder.offer(sweeper, config, t)?;
         progress(t);
     }
-    steps.seconds = begin.elapsed().as_secs_f64();
+    (steps.seconds, steps.cpu) = begin.read();
     Ok(steps)
 }
 
@@ -83,6 +81,7 @@ fn jacobi(sweeper: &mut Sweeper, t: f64, h: f64, exchange: bool) -> Result<(), R
     let nodes = 0..sweeper.instances.len();
     if exchange {
         nodes.clone().try_for_each(|node| sweeper.take(node))?;
+        sweeper.check_bounds(t)?;
         nodes.clone().try_for_each(|node| sweeper.give(node))?;
     }
     nodes.clone().try_for_each(|node| do_step(sweeper, node, t, h, false).map(|_| ()))
@@ -95,5 +94,5 @@ fn seidel(sweeper: &mut Sweeper, t: f64, h: f64) -> Result<(), RunError> {
         do_step(sweeper, node, t, h, false)?;
         sweeper.take(node)?;
     }
-    Ok(())
+    sweeper.check_bounds(t + h)
 }

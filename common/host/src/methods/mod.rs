@@ -9,6 +9,10 @@ mod settings;
 
 pub use settings::{Choices, Config, MethodKind, integrator_name};
 
+use std::time::Instant;
+
+use cpu_time::ThreadTime;
+
 use crate::error::Error;
 use crate::import::Interface;
 use crate::record::Recorder;
@@ -32,6 +36,22 @@ pub struct Steps {
     pub gap: f64,
     /// Wall time from the first step to the last [s]
     pub seconds: f64,
+    /// CPU time of the thread that steps, from the first step to the last [s]
+    pub cpu: f64,
+}
+
+/// Wall and CPU time since it was started.
+struct Clock(Instant, ThreadTime);
+
+impl Clock {
+    fn start() -> Self {
+        Self(Instant::now(), ThreadTime::now())
+    }
+
+    /// (wall, CPU) time [s].
+    fn read(&self) -> (f64, f64) {
+        (self.0.elapsed().as_secs_f64(), self.1.elapsed().as_secs_f64())
+    }
 }
 
 impl MethodKind {

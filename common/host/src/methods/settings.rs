@@ -173,15 +173,16 @@ impl Config {
             let wanted = "it must be 0, 1 or 2".into();
             return Err(SceneError::Setting { name: "order", value: self.order.to_string(), wanted });
         }
-        let needs_step = match self.method {
-            MethodKind::Common => !self.integrator.is_adaptive(),
-            MethodKind::CsPece => false,
-            _ => true,
-        };
-        if needs_step && self.step.is_none() {
+        if self.method != MethodKind::CsPece && self.is_fixed_step() && self.step.is_none() {
             return Err(SceneError::MissingSetting { name: "the step", option: "--H" });
         }
         Ok(())
+    }
+
+    /// Whether the steps are given, not controlled by the error.
+    #[must_use]
+    pub fn is_fixed_step(&self) -> bool {
+        self.method != MethodKind::Common || !self.integrator.is_adaptive()
     }
 
     /// The `k`-th point of the grid of step or interval [s].

@@ -5,7 +5,7 @@ mod package;
 mod read;
 
 pub use pack::pack;
-pub use package::Package;
+pub use package::{Package, outside_reference};
 pub use read::SspError;
 
 /// A system of components.

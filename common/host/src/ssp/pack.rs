@@ -8,13 +8,13 @@ use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-use super::{Package, SspError};
+use super::{Package, SspError, outside_reference};
 
-/// Packs a folder; the result lists the entries.
+/// Packs a folder with its FMUs and its reference results; the result lists the entries.
 ///
 /// # Errors
 /// A scene that cannot be read, an FMU that is missing, an archive that cannot be written.
-pub fn pack(folder: &Path, fmus: &Path, output: &Path) -> Result<Vec<String>, SspError> {
+pub fn pack(folder: &Path, fmus: &Path, references: &Path, output: &Path) -> Result<Vec<String>, SspError> {
     let package = Package::open(folder)?;
     let system = package.system()?;
     let mut files = BTreeMap::new();
@@ -22,6 +22,12 @@ pub fn pack(folder: &Path, fmus: &Path, output: &Path) -> Result<Vec<String>, Ss
     for component in &system.components {
         let fmu = package.fmu(&component.source, fmus)?;
         files.insert(component.source.clone(), fmu.path().to_owned());
+    }
+    if let Some(file) = &system.settings.reference {
+        let outside = outside_reference(references, file);
+        if !files.contains_key(file) && outside.is_file() {
+            files.insert(file.clone(), outside);
+        }
     }
     let written = |source: io::Error| SspError::Io { path: output.into(), source };
     let mut zip = ZipWriter::new(File::create(output).map_err(written)?);

@@ -14,6 +14,12 @@ use crate::import::{Archive, ArchiveError, Fmu, ImportError};
 /// System structure of a scene if no other is named.
 const DEFAULT_STRUCTURE: &str = "SystemStructure.ssd";
 
+/// A reference file that the scene does not hold: in the folder `references`, without the first folder of its path.
+#[must_use]
+pub fn outside_reference(references: &Path, file: &str) -> PathBuf {
+    references.join(Path::new(file).components().skip(1).collect::<PathBuf>())
+}
+
 /// A scene's files.
 pub struct Package {
     path: PathBuf,

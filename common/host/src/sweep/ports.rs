@@ -4,6 +4,9 @@ use super::Sweeper;
 use crate::error::RunError;
 use crate::scene::{Network, Source};
 
+/// Signals beyond this multiple of their nominal value have run away.
+pub(super) const RUN_AWAY: f64 = 1e9;
+
 /// What one component gives and takes, for a plain exchange.
 pub struct Port {
     /// Signals it gives
@@ -55,6 +58,21 @@ impl Sweeper {
             self.values[signal] = value;
         }
         result.map_err(|fault| self.failed(node, fault))
+    }
+
+    /// No signal has run away, as they do in a plain exchange of true forces.
+    ///
+    /// # Errors
+    /// The first signal that has, at the time `t`.
+    pub fn check_bounds(&self, t: f64) -> Result<(), RunError> {
+        let within = |(value, bound): (&f64, &f64)| value.abs() <= *bound;
+        match self.values.iter().zip(&self.bounds).position(|pair| !within(pair)) {
+            Some(signal) => {
+                let value = self.values[signal];
+                Err(RunError::Diverged { t, signal: self.signal_names[signal].clone(), value })
+            }
+            None => Ok(()),
+        }
     }
 
     /// Sets all inputs of a component from the signals as they are.
