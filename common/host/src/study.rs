@@ -133,7 +133,7 @@ pub struct Options<'a> {
     pub overrides: &'a [Override],
     /// Folder of reference files that the scene does not hold
     pub references: &'a Path,
-    /// Timed runs of each point
+    /// Timed runs of each point; 0: no times, and counts include the recording
     pub runs: u32,
 }
 
@@ -331,6 +331,10 @@ impl Bench<'_> {
         point.energy = audit.balance(&recorder.rows, first);
         point.gap = (!scene.network.joints.is_empty()).then(|| recorder.gap());
         point.evaluations = Some(evaluations(&recorder, first + energies.len(), scene, &config, &cost));
+        if self.options.runs == 0 {
+            point.cost = Some(cost);
+            return Ok(());
+        }
         let times = timed(scene, &config, &overrides, self.options.runs)?;
         point.wall_min = Some(times.wall[0]);
         point.wall_median = Some(times.wall[times.wall.len() / 2]);
@@ -376,7 +380,7 @@ fn timed(scene: &Scene, config: &Config, overrides: &[Override], runs: u32) -> R
     let once = || scene.run(config, overrides, &mut Recorder::off(), &mut |_| ());
     let cost = once()?;
     let (mut wall, mut cpu) = (Vec::new(), Vec::new());
-    for _ in 0..runs.max(1) {
+    for _ in 0..runs {
         let (mut sum, mut busy, mut n) = (0.0, 0.0, 0.0);
         while n < 1.0 || (sum < LEAST_TIME && n < 1000.0) {
             let steps = once()?.steps;

@@ -141,13 +141,14 @@ fn a_study_of_true_forces_diverges_and_closing_joints_refuse_plain_exchange() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("study.csv");
     let study = |scene: &str, options: &[&str]| {
-        let arguments = [&["study", scene, "--runs", "1", "-o", file.to_str().unwrap(), "--json"], options];
+        let arguments = [&["study", scene, "--runs", "0", "-o", file.to_str().unwrap(), "--json"], options];
         json(&koppel(&arguments.concat()))["points"].as_array().unwrap().clone()
     };
     let of = |points: &[Value], method: &str| -> Vec<Value> {
         points.iter().filter(|p| p["method"] == method).cloned().collect()
     };
     let points = study("scenes/two_mass", &["--stop", "0.5"]);
+    assert!(points.iter().all(|p| p["wall_min"].is_null()), "no times are asked for");
     for point in of(&points, "raw jacobi") {
         assert!(point["status"].as_str().unwrap().starts_with("diverged at t = "), "{point}");
         assert!(point["e_max"].is_null());
@@ -177,7 +178,7 @@ fn an_archive_holds_its_reference() {
     let archive = folder.path().join("pendulum.ssp");
     let archive = archive.to_str().unwrap();
     assert_eq!(code(&["pack", PENDULUM, "--output", archive]), 0);
-    let options = ["--references", "nowhere", "--runs", "1", "--stop", "0.02"];
+    let options = ["--references", "nowhere", "--runs", "0", "--stop", "0.02"];
     assert_eq!(code(&[&["study", archive], &options[..]].concat()), 0);
     let refused = koppel(&[&["study", PENDULUM], &options[..]].concat());
     assert_eq!(refused.status.code(), Some(3));
@@ -191,7 +192,7 @@ fn an_archive_holds_its_reference() {
 #[test]
 fn a_study_with_other_parameters_makes_its_reference() {
     fmus();
-    let options = ["--runs", "1", "--stop", "0.02", "--set", "upper.mass=2", "--json"];
+    let options = ["--runs", "0", "--stop", "0.02", "--set", "upper.mass=2", "--json"];
     let study = json(&koppel(&[&["study", PENDULUM], &options[..]].concat()));
     assert!(study["reference"].as_str().unwrap().starts_with("common dop853 and dopri5 at 1e-12, apart by "));
 }
@@ -199,7 +200,7 @@ fn a_study_with_other_parameters_makes_its_reference() {
 #[test]
 fn a_study_finds_the_orders() {
     fmus();
-    let study = json(&koppel(&["study", PENDULUM, "--runs", "1", "--stop", "0.5", "--json"]));
+    let study = json(&koppel(&["study", PENDULUM, "--runs", "0", "--stop", "0.5", "--json"]));
     let order = |name: &str| {
         let points = study["points"].as_array().unwrap();
         points.iter().find(|p| p["method"] == name).unwrap()["order"].as_f64().unwrap()

@@ -153,7 +153,7 @@ pub(super) struct Study {
     /// Folder of reference files that the scene does not hold
     #[arg(long, default_value = "tests/reference")]
     pub(super) references: PathBuf,
-    /// Timed runs of each point, after one that does not count
+    /// Timed runs of each point, after one that does not count; 0: no times, and counts include the recording
     #[arg(long, default_value_t = 7)]
     pub(super) runs: u32,
 }
