@@ -78,18 +78,25 @@ def test_fmpy_simulates_with_validation(fmu, name, interface, tmp_path):
 
 
 # terminals --------------------------------------------------------------------------------------------------------
-# ports of suspension.md by kind; the closed or fixed points of the assemblies are no ports
+# ports of suspension.md, coupling.md and rvdp_absorber.md by kind; the closed or fixed points of the assemblies are no ports
 PORTS = {
+    "bushing": {"A": "follower", "B": "follower"},
     "double_pendulum": {"C": "leader"},
     "double_wishbone": {"P": "leader"},
     "four_bar": {"P": "leader"},
+    "guide": {"H": "leader", "P": "leader"},
     "link2": {"A": "follower", "B": "leader"},
     "link3": {"B": "follower", "C": "leader", "P": "leader"},
+    "load": {"A": "follower"},
+    "primary_oscillator": {"A": "follower", "P": "leader"},
     "strut_link": {"D": "follower", "C": "leader", "T": "force"},
 }
 VECTOR = ("x", "y", "z")
 SYMMETRIC = ("xx", "xy", "xz", "yy", "yz", "zz")
 MEMBERS = [f"{quantity}.{axis}" for quantity in "rvaF" for axis in VECTOR] + [f"M.{axes}" for axes in SYMMETRIC]
+SCALAR_MEMBERS = ["s", "v", "a", "F", "M"]
+#: Ports in one coordinate, and those that have both forms.
+SCALAR, BOTH = {("guide", "H")}, {("primary_oscillator", "A"), ("primary_oscillator", "P")}
 
 
 def terminals(fmu):
@@ -114,14 +121,15 @@ def test_members_of_leader_and_follower_meet_in_the_inertial_connection(fmu, nam
     for port, terminal in terminals(fmu(name)).items():
         of, kind = members(terminal), PORTS[name][port]
         follows = kind != "leader"
-        wanted = [m for m in MEMBERS if kind != "force" or not m.startswith("a.")]
-        assert sorted(m for m in of if not m.startswith("force.")) == sorted(wanted)
-        assert set(of) - set(wanted) == ({f"force.{axis}" for axis in VECTOR} if follows else set())
+        scalar, spatial = (name, port) in SCALAR | BOTH, (name, port) not in SCALAR
+        wanted = SCALAR_MEMBERS * scalar + [m for m in MEMBERS if kind != "force" or not m.startswith("a.")] * spatial
+        true = ["force"] * scalar + [f"force.{axis}" for axis in VECTOR] * spatial if follows else []
+        assert sorted(of) == sorted(wanted + true)
         for member, variable in of.items():
-            quantity, component = member.split(".")
+            quantity, dot, component = member.partition(".")
             expected = {"F": "F0", "force": "F"}.get(quantity, quantity) if follows else quantity
-            assert variable == f"{port}.{expected}.{component}"
-            motion = quantity in ("r", "v", "a")
+            assert variable == f"{port}.{expected}{dot}{component}"
+            motion = quantity in ("r", "s", "v", "a")
             assert fmu(name).variable(variable).causality == ("input" if motion == follows else "output")
 
 

@@ -108,9 +108,9 @@ def test_capabilities_are_declared(name):
 
 # the same numbers -----------------------------------------------------------------------------------------------------
 def force(description, stop):
-    """Inputs that move: the first three of the kind force or acceleration, as fmpy takes them."""
+    """Inputs that move: the first three of each kind force, velocity and acceleration, as fmpy takes them."""
     inputs = [v.name for v in description.modelVariables if v.causality == "input"]
-    names = [name for name in inputs if re.search(r"\.[Fa](\.|$)", name)][:3]
+    names = [name for kind in "Fva" for name in [n for n in inputs if re.search(rf"\.{kind}(\.|$)", n)][:3]]
     t = np.linspace(0.0, stop, 101)
     columns = [0.5 * np.sin(7.0 * t + i) for i in range(len(names))]
     signal = np.zeros(len(t), dtype=[("time", float), *[(name, float) for name in names]])

@@ -20,7 +20,7 @@ from koppel import Fmu, paths
 from koppel.work_precision import fitted_order
 
 STOP, GRAVITY = 2.0, 9.81
-STEPS = (5e-3, 2.5e-3, 1.25e-3)
+STEPS = (5e-3, 2.5e-3, 1.25e-3, 6.25e-4)
 # angles from hanging
 END = np.array([-0.08275830682, -0.96114544454, 0.40736207491, 11.89895505304])
 OUTPUTS = [f"{link}.{state}" for link in ("upper", "lower") for state in ("angle.theta", "angle_rate.theta")]
@@ -122,4 +122,4 @@ def test_chain_converges_at_the_promised_order(host, tmp_path):
         errors.append(np.abs(end - END).max())
     assert fitted_order([1.0 / H for H in STEPS], errors) == pytest.approx(2.0, abs=0.2), errors
     # limits of `jacobi`, linear inputs, over all samples: 6e-2 and 4e-3
-    assert errors[0] <= 6e-2 and errors[-1] <= 4e-3, errors
+    assert errors[0] <= 6e-2 and errors[2] <= 4e-3, errors

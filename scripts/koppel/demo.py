@@ -1,4 +1,4 @@
-"""`python -m koppel.demo`: the paper's double wishbone through fmpy, its work-precision study and the report."""
+"""`python -m koppel.demo`: the paper's double wishbone through fmpy as one FMU and as coupled elements, and the report."""
 
 import csv
 import sys
@@ -6,13 +6,41 @@ from pathlib import Path
 
 import numpy as np
 
-from . import host, paths, plots, report, scenes, work_precision
+from . import host, library, paths, plots, report, scenes, work_precision
 from .fmu import Fmu, FmuError, Result
 from .loader import Loader, LoaderError
 from .reference import BadReference, Reference
+from .scene import SceneError, plot, study
+from .scene.study import Method, Point
 
 SYSTEM = "double_wishbone"
 STOP = 10.0
+
+#: Methods of the coupled elements with their steps or tolerances; the paper's own way comes first.
+COUPLED = (
+    (Method("common heun", {"method": "common", "integrator": "heun"}), (50e-3, 10e-3, 2.5e-3)),
+    (Method("common rk4", {"method": "common", "integrator": "rk4"}), (50e-3, 25e-3, 10e-3, 5e-3)),
+    (Method("common dopri5", {"method": "common", "integrator": "dopri5"}, adaptive=True), (1e-4, 1e-6, 1e-8)),
+    (Method("cs predict", {"method": "cs-predict", "order": 1}), (5e-3, 2.5e-3, 1e-3)),
+    (Method("cs pece k = 2", {"method": "cs-pece", "order": 2}), (5e-3, 2.5e-3)),
+)
+
+
+def coupled(out: Path) -> list[Point]:
+    """The same case with every element an FMU of its own, printed as it goes, with its table and plots."""
+    with library.scene(SYSTEM) as scene:
+        parts = ", ".join(component.fmu.name for component in scene.components.values())
+        print(f"\nthe same from separate FMUs ({parts}), loop closed at the carrier's upper joint")
+        print(study.HEADER, flush=True)
+        points: list[Point] = []
+        for method, values in COUPLED:
+            where = {"tolerances": values, "steps": ()} if method.adaptive else {"steps": values}
+            points += scene.study(
+                methods=[method], repeat=3, each=lambda point: print(study.line(point), flush=True), **where
+            )
+    study.write_csv(points, out / "coupled.csv", host.facts())
+    plot.work_precision(points, out)
+    return points
 
 
 def write_result(path: Path, runs: dict[str, Result], reference: Reference):
@@ -90,6 +118,7 @@ def main():
         report.double_wishbone(
             out / "report.html",
             points=points,
+            coupled=coupled(out),
             error=error,
             amplitude=amplitude,
             source=[line.removeprefix("source: ") for line in reference.source if line.startswith("source: ")],
@@ -97,6 +126,7 @@ def main():
             facts=host.facts(),
             figure18=out / "figure18.png",
             work_precision=out / "work_precision.png",
+            coupled_plot=out / "error_over_time.png",
         )
     print(f"\nreport: {out / 'report.html'}")
 
@@ -104,5 +134,5 @@ def main():
 if __name__ == "__main__":
     try:
         main()
-    except (FmuError, LoaderError, BadReference, FileNotFoundError) as failed:
+    except (FmuError, LoaderError, BadReference, SceneError, FileNotFoundError) as failed:
         sys.exit(f"error: {failed}")

@@ -53,6 +53,8 @@ KINDS = (
     (r"\.angle_rate\.|\.omega\.", "rate", "rad/s"),
     (r"\.q\[", "quaternion", "1"),
     (r"\.F\.", "force", "N"),
+    (r"(^|\.)s(\[\d+\])?$", "position", "m"),
+    (r"(^|\.)v(\[\d+\])?$", "velocity", "m/s"),
     (r"\.r\.", "position", "m"),
     (r"\.v\.", "velocity", "m/s"),
     (r"\.a\.", "acceleration", "m/s2"),
@@ -172,6 +174,16 @@ class Reference:
         parameters = self.path.with_suffix(".json")
         #: Parameters that came with the file.
         self.parameters = json.loads(parameters.read_text(encoding="utf-8")) if parameters.is_file() else {}
+
+    @classmethod
+    def sampled(cls, t: np.ndarray, names: list[str], values: np.ndarray, source: str) -> "Reference":
+        """Samples that are no file."""
+        made = cls.__new__(cls)
+        made.path, made.source, made.parameters = Path(source), [f"source: {source}"], {}
+        made.columns = ["t", *names]
+        made.t, made.values = t, np.column_stack([t, values])
+        made.variables = {name: i + 1 for i, name in enumerate(names)}
+        return made
 
     @classmethod
     def named(cls, name: str, system: str = "suspension") -> "Reference":

@@ -1,4 +1,5 @@
-//! The archive: model description and binary in one zip, the same bytes at every build.
+//! The archive: model description, binary, documentation, icon and reference results in one zip, the same bytes at
+//! every build.
 
 use std::fs;
 use std::io::{self, Write};
@@ -11,6 +12,8 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use crate::Standard;
 use crate::describe::model_description;
+use crate::documentation::{DocumentationError, page};
+use crate::reference::{self, FOLDER};
 use crate::terminals::terminals;
 
 /// Everything that can go wrong while packing.
@@ -27,6 +30,9 @@ pub enum PackError {
     /// The description cannot be written.
     #[error("model description: {0}")]
     Description(#[from] io::Error),
+    /// The documentation does not fit the model.
+    #[error("documentation: {0}")]
+    Documentation(#[from] DocumentationError),
     /// The archive cannot be written.
     #[error("archive: {0}")]
     Archive(#[from] zip::result::ZipError),
@@ -42,16 +48,30 @@ fn contents<M: Model>(
     extension: &str,
 ) -> Result<Vec<(String, Vec<u8>)>, PackError> {
     let binary = format!("binaries/{}/{}.{extension}", standard.platform(), M::NAME);
+    let documentation = M::DOCUMENTATION;
     let mut files = vec![
         (binary, library.to_vec()),
+        ("documentation/index.html".into(), page::<M>()?.into_bytes()),
+        ("documentation/fmi-ls-ref.txt".into(), reference::notes::<M>().into_bytes()),
         ("documentation/licenses/license.spdx".into(), b"MIT OR Apache-2.0\n".to_vec()),
         ("documentation/licenses/LICENSE-APACHE".into(), include_bytes!("../../../LICENSE-APACHE").to_vec()),
         ("documentation/licenses/LICENSE-MIT".into(), include_bytes!("../../../LICENSE-MIT").to_vec()),
         ("modelDescription.xml".into(), model_description::<M>(standard)?),
     ];
-    if standard == Standard::Fmi3 {
-        let terminals = terminals::<M>()?;
-        files.extend(terminals.map(|xml| ("terminalsAndIcons/terminalsAndIcons.xml".into(), xml)));
+    let mut references = |name: String, content: Vec<u8>| files.push((format!("{FOLDER}/{name}"), content));
+    references("fmi-ls-manifest.xml".into(), reference::manifest::<M>()?);
+    references(reference::results_name::<M>(), documentation.reference.into());
+    if let Some(inputs) = documentation.reference_inputs {
+        references(reference::inputs_name::<M>(), inputs.into());
+    }
+    let icon = documentation.icon_png.to_vec();
+    match standard {
+        Standard::Fmi2 => files.push(("model.png".into(), icon)),
+        Standard::Fmi3 => files.extend([
+            ("terminalsAndIcons/icon.png".into(), icon),
+            ("terminalsAndIcons/icon.svg".into(), documentation.icon_svg.into()),
+            ("terminalsAndIcons/terminalsAndIcons.xml".into(), terminals::<M>()?),
+        ]),
     }
     Ok(files)
 }

@@ -1,10 +1,14 @@
-//! `terminalsAndIcons.xml`: the ports of the variable table, so that a host can connect one at once.
+//! `terminalsAndIcons.xml`: the place of the icon, and the ports of the variable table, so that a host can connect one
+//! at once.
 //!
 //! | port | has | terminal kind |
 //! | --- | --- | --- |
 //! | leader | inputs `P.F`, `P.M`; outputs `P.r`, `P.v`, `P.a` | `org.koppel.port.leader`, further slots inside it |
 //! | follower | inputs `P.r`, `P.v`, `P.a`; outputs `P.F`, `P.F0`, `P.M` | `org.koppel.port.follower` |
 //! | force | inputs `P.r`, `P.v`, no `P.a`: a follower without inertia | `org.koppel.port.force` |
+//!
+//! A follower whose force is not affine in the acceleration has `.not_affine` after its kind, a leader that is known at
+//! samples only `.sampled` (fields marked so in the variable table): such a leader takes no inertia.
 //!
 //! Members with the same name belong together. That is the inertial connection: the follower's `P.F0` meets the
 //! leader's `P.F` as member `F`, `M` meets `M`; the follower's true force is the member `force`, which no leader has.
@@ -13,7 +17,7 @@
 use std::collections::BTreeSet;
 use std::io;
 
-use model::{Causality, Model};
+use model::{Causality, Model, PortLaw};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
 
@@ -21,7 +25,7 @@ use crate::table::{Table, Variable};
 
 /// Kind of a port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Port {
+pub(crate) enum Port {
     Leader,
     Follower,
     Force,
@@ -36,7 +40,7 @@ impl Port {
         }
     }
 
-    const fn description(self) -> &'static str {
+    pub(crate) const fn description(self) -> &'static str {
         match self {
             Self::Leader => "Gives motion, takes force and inertia",
             Self::Follower => "Takes motion, gives force and inertia",
@@ -55,11 +59,22 @@ impl Port {
     }
 }
 
+/// What comes after the kind of the port `name`.
+fn mark(variables: &[Variable], name: &str) -> &'static str {
+    let of_port = |v: &&Variable| parts(&v.name).is_some_and(|(p, ..)| p == name);
+    let laws = variables.iter().filter(of_port).map(|v| v.entry.port);
+    match laws.into_iter().find(|law| *law != PortLaw::Regular) {
+        Some(PortLaw::NotAffine) => ".not_affine",
+        Some(PortLaw::Sampled) => ".sampled",
+        Some(PortLaw::Regular) | None => "",
+    }
+}
+
 /// Quantities of a port; `s` is the position of a scalar one.
 const QUANTITIES: [&str; 7] = ["r", "s", "v", "a", "F", "F0", "M"];
 
 /// Port, quantity and component of `P.F0.x`; none for other variables.
-fn parts(name: &str) -> Option<(&str, &str, &str)> {
+pub(crate) fn parts(name: &str) -> Option<(&str, &str, &str)> {
     let mut found = None;
     for quantity in QUANTITIES {
         for (at, dotted) in name.match_indices('.') {
@@ -110,22 +125,46 @@ fn members(xml: &mut Xml, variables: &[Variable], name: &str, port: Port) -> io:
     Ok(())
 }
 
-/// The file, or none without ports.
+/// Names before a port's quantities: ports and slots.
+fn names(variables: &[Variable]) -> BTreeSet<&str> {
+    variables.iter().filter_map(|v| parts(&v.name)).map(|(p, ..)| p).collect()
+}
+
+/// The ports by name.
+pub(crate) fn ports(variables: &[Variable]) -> Vec<(&str, Port)> {
+    names(variables).into_iter().filter_map(|name| Some((name, port(variables, name)?))).collect()
+}
+
+/// Place of the icon: it fills the square of the coordinate system.
+fn representation(xml: &mut Xml) -> io::Result<()> {
+    const CORNERS: [(&str, &str); 4] = [("x1", "-100"), ("y1", "-100"), ("x2", "100"), ("y2", "100")];
+    xml.create_element("GraphicalRepresentation").write_inner_content(|xml| {
+        xml.create_element("CoordinateSystem")
+            .with_attributes(CORNERS)
+            .with_attribute(("suggestedScalingFactorTo_mm", "0.1"))
+            .write_empty()?;
+        xml.create_element("Icon").with_attributes(CORNERS).write_empty()?;
+        Ok(())
+    })?;
+    Ok(())
+}
+
+/// The file.
 ///
 /// # Errors
 /// None that are known: writing goes to memory.
-pub(crate) fn terminals<M: Model>() -> io::Result<Option<Vec<u8>>> {
+pub(crate) fn terminals<M: Model>() -> io::Result<Vec<u8>> {
     let table = Table::new::<M>();
     let variables = table.variables();
-    let names: BTreeSet<_> = variables.iter().filter_map(|v| parts(&v.name)).map(|(p, ..)| p).collect();
-    let ports: Vec<_> = names.iter().filter_map(|name| Some((*name, port(variables, name)?))).collect();
-    if ports.is_empty() {
-        return Ok(None);
-    }
+    let (names, ports) = (names(variables), ports(variables));
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
     xml.create_element("fmiTerminalsAndIcons").with_attribute(("fmiVersion", "3.0")).write_inner_content(
         |xml| {
+            representation(xml)?;
+            if ports.is_empty() {
+                return Ok(());
+            }
             xml.create_element("Terminals").write_inner_content(|xml| {
                 for (name, port) in &ports {
                     terminal(xml, variables, name, *port, &names)?;
@@ -136,7 +175,7 @@ pub(crate) fn terminals<M: Model>() -> io::Result<Option<Vec<u8>>> {
         },
     )?;
     xml.write_event(Event::Text(BytesText::new("\n")))?;
-    Ok(Some(xml.into_inner()))
+    Ok(xml.into_inner())
 }
 
 /// One terminal with its further slots.
@@ -147,7 +186,8 @@ fn terminal(
     port: Port,
     names: &BTreeSet<&str>,
 ) -> io::Result<()> {
-    let attributes = [("name", name), ("matchingRule", "bus"), ("terminalKind", port.kind())];
+    let kind = format!("{}{}", port.kind(), mark(variables, name));
+    let attributes = [("name", name), ("matchingRule", "bus"), ("terminalKind", &kind)];
     xml.create_element("Terminal")
         .with_attributes(attributes)
         .with_attribute(("description", port.description()))
@@ -168,6 +208,8 @@ fn terminal(
 
 #[cfg(test)]
 mod tests {
+    use model::{Entry, Kind};
+
     use super::*;
 
     #[test]
@@ -178,5 +220,20 @@ mod tests {
         for other in ["chassis.a.x", "loop.gap", "P", "strut.force", "angle.theta", "der(P.r.x)"] {
             assert_eq!(parts(other), None, "{other}");
         }
+    }
+
+    #[test]
+    fn ports_are_marked_by_their_variables() {
+        let variable = |name: &str, law| {
+            let mut entry = Entry::scalar("", Kind::Float64);
+            entry.port = law;
+            Variable { name: name.into(), entry, derivative_of: None }
+        };
+        let variables = [
+            variable("A.a.x", PortLaw::NotAffine),
+            variable("P.r.x", PortLaw::Regular),
+            variable("V.s", PortLaw::Sampled),
+        ];
+        assert_eq!(["A", "P", "V"].map(|name| mark(&variables, name)), [".not_affine", "", ".sampled"]);
     }
 }

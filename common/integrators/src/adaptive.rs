@@ -1,22 +1,17 @@
 //! Steps as long as the tolerance allows: `norm.rs` measures the error, `pace.rs` chooses the next step.
 //!
-//! The step counts if the error is at most 1. Source of the start step: Hairer, Nørsett & Wanner, section II.4.
+//! The step counts if the error is at most 1.
 
 use crate::error::all_finite;
+use crate::first_step;
 use crate::one_step::{Call, OneStep, Start};
-use crate::pace::{LEAST_ERROR, Taken};
+use crate::pace::{LEAST_ERROR, RESOLUTION, SAFETY, SHRINK, Taken, fit};
 use crate::run::{MAX_EVALUATIONS, Run, Watch};
 use crate::solver::Memory;
 use crate::{Dense, Ode, StepError};
 
-/// Longest part of a rejected step that is tried next.
-const SAFETY: f64 = 0.9;
-/// The same after an error of the model.
-const SHRINK: f64 = 0.2;
-/// The same where the equations of an implicit step had no solution.
+/// Part of a step that is tried next where the equations of an implicit step had no solution.
 const HALF: f64 = 0.5;
-/// Smallest step in units of the rounding of time.
-const RESOLUTION: f64 = 8.0 * f64::EPSILON;
 
 /// Runs to `t_end` and leaves in `memory` what the next call starts with.
 #[inline]
@@ -171,11 +166,7 @@ impl<M> Control<'_, M> {
         })
     }
 
-    /// Start step of Hairer, Nørsett & Wanner, II.4: an Euler step shows how fast the slope turns.
-    ///
-    /// ```text
-    /// h_0 = 0.01 |x| / |f|,   h_1 = (0.01 / max(|f|, |f(x + h_0 f) - f| / h_0))^(1/p),   h = min(100 h_0, h_1)
-    /// ```
+    /// Start step, see `first_step.rs`.
     fn first_step<const N: usize, O: Ode<N>>(
         &self,
         call: &mut Call<'_, N, O, M::Work>,
@@ -188,21 +179,14 @@ impl<M> Control<'_, M> {
         let remaining = self.t_end - t;
         let d_0 = call.norm.of(x, x, x);
         let d_1 = call.norm.of(slope, x, x);
-        let h_0 = if d_0 < 1e-5 || d_1 < 1e-5 { 1e-6 } else { 0.01 * d_0 / d_1 }.min(remaining);
+        let h_0 = first_step::euler(d_0, d_1, remaining);
         let euler: [f64; N] = std::array::from_fn(|i| x[i] + h_0 * slope[i]);
         let Ok(turned) = call.rhs(t + h_0, &euler) else {
             return h_0;
         };
         let change: [f64; N] = std::array::from_fn(|i| turned[i] - slope[i]);
         let d_2 = call.norm.of(&change, x, x) / h_0;
-        let steepest = d_1.max(d_2);
-        let h_1 = if steepest <= 1e-15 {
-            (1e-3 * h_0).max(1e-6)
-        } else {
-            (0.01 / steepest).powf(1.0 / self.method.pace().order)
-        };
-        let h = (100.0 * h_0).min(h_1).min(remaining);
-        if h > 0.0 { h } else { h_0 } // not a number
+        first_step::length([d_1, d_2], h_0, self.method.pace().order, remaining)
     }
 }
 
@@ -210,15 +194,4 @@ impl<M> Control<'_, M> {
 enum Attempt<T, const N: usize> {
     Within { trial: T, error: f64, dense: Option<Dense<N>> },
     Beyond { safety: f64, error: f64, index: usize },
-}
-
-/// The step size next to `h` that leaves no tiny rest: what remains is done in one step or in two halves.
-fn fit(h: f64, remaining: f64) -> f64 {
-    if h >= remaining {
-        remaining
-    } else if 2.0 * h > remaining {
-        0.5 * remaining
-    } else {
-        h
-    }
 }

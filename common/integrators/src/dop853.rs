@@ -18,10 +18,10 @@ use crate::pace::Pace;
 use crate::{Complex, Dense, Ode, StepError};
 
 /// Nonzero weights with the stages they belong to.
-type Row = &'static [(usize, f64)];
+pub(crate) type Row = &'static [(usize, f64)];
 
 /// Rows 2 to 12 of `a`: nonzero entries with their columns.
-const A: [Row; 11] = [
+pub(crate) const A: [Row; 11] = [
     &[(0, 0.052_600_151_958_767_73)],
     &[(0, 0.019_725_056_984_537_9), (1, 0.059_175_170_953_613_7)],
     &[(0, 0.029_587_585_476_806_85), (2, 0.088_762_756_430_420_54)],
@@ -75,7 +75,7 @@ const A: [Row; 11] = [
     ],
 ];
 
-const B: Row = &[
+pub(crate) const B: Row = &[
     (0, 0.054_293_734_116_568_765),
     (5, 4.450_312_892_752_409),
     (6, 1.891_517_899_314_500_3),
@@ -86,7 +86,7 @@ const B: Row = &[
     (11, 0.044_710_615_727_772_59),
 ];
 
-const C: [f64; 11] = [
+pub(crate) const C: [f64; 11] = [
     0.052_600_151_958_767_73,
     0.078_900_227_938_151_6,
     0.118_350_341_907_227_4,
@@ -101,7 +101,7 @@ const C: [f64; 11] = [
 ];
 
 /// Weights minus those of the embedded method of order 5.
-const ERROR_5: Row = &[
+pub(crate) const ERROR_5: Row = &[
     (0, 0.013_120_044_994_194_88),
     (5, -1.225_156_446_376_204_4),
     (6, -0.495_758_949_657_250_2),
@@ -113,11 +113,11 @@ const ERROR_5: Row = &[
 ];
 
 /// The other embedded method, of order 3, has three weights.
-const WEIGHTS_3: Row =
+pub(crate) const WEIGHTS_3: Row =
     &[(0, 0.244_094_488_188_976_4), (8, 0.733_846_688_281_611_8), (11, 0.022_058_823_529_411_766)];
 
 /// Rows of the three further stages of the continuous extension; stage 13 is the slope at the new state.
-const A_DENSE: [Row; 3] = [
+pub(crate) const A_DENSE: [Row; 3] = [
     &[
         (0, 0.056_167_502_283_047_954),
         (6, 0.253_500_210_216_624_83),
@@ -150,10 +150,10 @@ const A_DENSE: [Row; 3] = [
     ],
 ];
 
-const C_DENSE: [f64; 3] = [0.1, 0.2, 0.777_777_777_777_777_8];
+pub(crate) const C_DENSE: [f64; 3] = [0.1, 0.2, 0.777_777_777_777_777_8];
 
 /// Weights of its last four terms.
-const D: [Row; 4] = [
+pub(crate) const D: [Row; 4] = [
     &[
         (0, -8.428_938_276_109_013),
         (5, 0.566_714_953_519_377_7),
@@ -212,9 +212,11 @@ const D: [Row; 4] = [
     ],
 ];
 
+pub(crate) const PACE: Pace = Pace { order: 8.0, beta: 0.0, shrink: 1.0 / 3.0, grow: 6.0, predictive: false };
+
 /// Evaluations per step, and stages with those of the continuous extension.
-const STAGES: usize = 12;
-const ALL_STAGES: usize = 16;
+pub(crate) const STAGES: usize = 12;
+pub(crate) const ALL_STAGES: usize = 16;
 
 /// The method.
 pub(crate) struct Dop853;
@@ -255,6 +257,15 @@ fn moved<const N: usize>(x: &[f64; N], by: &[f64; N]) -> [f64; N] {
     std::array::from_fn(|i| x[i] + by[i])
 }
 
+/// One error from the sizes of the two estimates.
+pub(crate) fn joined(e_5: f64, e_3: f64) -> f64 {
+    if e_5 > 0.0 {
+        e_5 * e_5 / (e_5 * e_5 + 0.01 * e_3 * e_3).sqrt()
+    } else {
+        e_5 // zero, or not a number
+    }
+}
+
 /// New state and stages of one step.
 pub(crate) struct Trial<const N: usize> {
     x: [f64; N],
@@ -268,7 +279,7 @@ impl<const N: usize> OneStep<N> for Dop853 {
     type Work = ();
 
     fn pace(&self) -> Pace {
-        Pace { order: 8.0, beta: 0.0, shrink: 1.0 / 3.0, grow: 6.0, predictive: false }
+        PACE
     }
 
     #[inline]
@@ -308,12 +319,7 @@ impl<const N: usize> OneStep<N> for Dop853 {
         let embedded = combine(h, WEIGHTS_3, &trial.k);
         let third: [f64; N] = std::array::from_fn(|i| trial.x[i] - from.x[i] - embedded[i]);
         let [e_5, e_3] = [&parts, &third].map(|e| call.norm.of(e, &from.x, &trial.x));
-        let size = if e_5 > 0.0 {
-            e_5 * e_5 / (e_5 * e_5 + 0.01 * e_3 * e_3).sqrt()
-        } else {
-            e_5 // zero, or not a number
-        };
-        Estimate { size, parts }
+        Estimate { size: joined(e_5, e_3), parts }
     }
 
     fn dense<O: Ode<N>>(
@@ -339,7 +345,7 @@ impl<const N: usize> OneStep<N> for Dop853 {
 }
 
 /// The extension sorted by powers of theta: from the inside, times `theta` and `1 - theta` in turn.
-fn powers_of_theta<const N: usize>(f: &[[f64; N]; 7]) -> [[f64; N]; 7] {
+pub(crate) fn powers_of_theta<const N: usize>(f: &[[f64; N]; 7]) -> [[f64; N]; 7] {
     let mut p = [[0.0; N]; 8];
     for (i, f) in f.iter().enumerate().rev() {
         p[0] = moved(&p[0], f);

@@ -19,6 +19,9 @@
 //! R. H. C. Takahashi, ACM TOMS 47 (2020) (root finder). Left out: integration backwards in time, multistep methods,
 //! sparse matrices.
 //!
+//! Where the number of states is known only at run time, [`ExplicitSolver`] takes the same steps one by one; it allocates when
+//! it is made.
+//!
 //! ```
 //! use integrators::{Method, Ode, Settings, Solver, Statistics};
 //!
@@ -53,10 +56,12 @@ mod complex;
 mod dense;
 mod dop853;
 mod dopri5;
+mod dynamic;
 mod error;
 mod events;
 mod exact;
 mod explicit;
+mod first_step;
 mod fixed;
 mod heun;
 mod lu;
@@ -78,6 +83,7 @@ mod statistics;
 
 pub use complex::Complex;
 pub use dense::Dense;
+pub use dynamic::{DynamicOde, ExplicitSolver, NotExplicit};
 pub use error::{SettingsError, StepError};
 pub use events::{Crossing, Indicators, Reached};
 pub use exact::Transition;

@@ -7,6 +7,17 @@
 
 use crate::{Ode, Settings};
 
+/// `value` in units of the tolerance at a component of magnitude `x`; 0 for what does not count.
+#[inline]
+pub(crate) fn scaled(value: f64, nominal: f64, x: f64, [rtol, atol]: [f64; 2]) -> f64 {
+    if nominal.is_finite() { value / (atol * nominal + rtol * x) } else { 0.0 }
+}
+
+/// Number of components that count, at least 1.
+pub(crate) fn counted(nominal: &[f64]) -> f64 {
+    nominal.iter().map(|n| if n.is_finite() { 1.0 } else { 0.0 }).sum::<f64>().max(1.0)
+}
+
 /// Measures errors in units of the tolerance.
 pub(crate) struct Norm<const N: usize> {
     nominal: [f64; N],
@@ -20,8 +31,7 @@ impl<const N: usize> Norm<N> {
     /// `rtol` is what the method makes of the tolerance wanted; `atol` keeps its ratio to it.
     pub(crate) fn new<O: Ode<N>>(ode: &O, settings: &Settings, rtol: f64) -> Self {
         let nominal = ode.nominal();
-        let counted = nominal.iter().map(|n| if n.is_finite() { 1.0 } else { 0.0 }).sum::<f64>().max(1.0);
-        Self { nominal, counted, rtol, atol: settings.atol * (rtol / settings.rtol) }
+        Self { nominal, counted: counted(&nominal), rtol, atol: settings.atol * (rtol / settings.rtol) }
     }
 
     pub(crate) fn rtol(&self) -> f64 {
@@ -30,7 +40,7 @@ impl<const N: usize> Norm<N> {
 
     #[inline]
     fn scaled(&self, value: f64, i: usize, x: f64) -> f64 {
-        if self.nominal[i].is_finite() { value / (self.atol * self.nominal[i] + self.rtol * x) } else { 0.0 }
+        scaled(value, self.nominal[i], x, [self.rtol, self.atol])
     }
 
     /// Size of `values` against the larger of two states.

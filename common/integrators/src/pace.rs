@@ -12,6 +12,24 @@ pub(crate) const LEAST_ERROR: f64 = 1e-4;
 /// The same for predictive control.
 const LEAST_PREDICTED: f64 = 1e-2;
 
+/// Longest part of a rejected step that is tried next.
+pub(crate) const SAFETY: f64 = 0.9;
+/// The same after an error of the model.
+pub(crate) const SHRINK: f64 = 0.2;
+/// Smallest step in units of the rounding of time.
+pub(crate) const RESOLUTION: f64 = 8.0 * f64::EPSILON;
+
+/// The step size next to `h` that leaves no tiny rest: what remains is done in one step or in two halves.
+pub(crate) fn fit(h: f64, remaining: f64) -> f64 {
+    if h >= remaining {
+        remaining
+    } else if 2.0 * h > remaining {
+        0.5 * remaining
+    } else {
+        h
+    }
+}
+
 /// The numbers of a method's control.
 #[derive(Clone, Copy)]
 pub(crate) struct Pace {

@@ -14,7 +14,7 @@
 //!
 //! Keys of `var`: `name`, `prefix`, `start` (a value, or `[x, y, z]`), `item` (an enumeration's
 //! variant), `min`, `max`, `above` (exclusive lower bound), `nominal`, `unit`, `tunable`,
-//! `discrete`, `local`, `exact`, `approx`, `state`, `depends` and, for the time derivative of a state,
+//! `discrete`, `local`, `sampled` and `not_affine` (of a port), `exact`, `approx`, `state`, `depends` and, for the time derivative of a state,
 //! `rate_depends`: names or prefixes of inputs and states, as one list `["a", "b"]`, the name of a
 //! constant of type `&[&str]`, or a list of such lists, one per component. `P.a.@` stands for the same component
 //! of P.a, `P.a.*` for all components without a scalar P.a, `=P.a` for that scalar alone.
@@ -81,6 +81,7 @@ struct FieldAttributes {
     tunable: bool,
     discrete: bool,
     local: bool,
+    port: Option<&'static str>,
     initial: Option<&'static str>,
     state: bool,
     depends: Vec<Tokens>,
@@ -136,6 +137,8 @@ fn field_attributes(field: &Field) -> syn::Result<FieldAttributes> {
                 "tunable" => a.tunable = true,
                 "discrete" => a.discrete = true,
                 "local" => a.local = true,
+                "sampled" => a.port = Some("Sampled"),
+                "not_affine" => a.port = Some("NotAffine"),
                 "exact" => a.initial = Some("Exact"),
                 "approx" => a.initial = Some("Approx"),
                 "name" | "prefix" => a.prefix = meta.value()?.parse::<syn::LitStr>()?.value(),
@@ -235,6 +238,7 @@ fn field_tokens(
     let rate_unit = a.state.then(|| per_second(&unit)).map(|u| quote!(#u));
     let rate_unit = option(rate_unit.as_ref());
     let field_causality = format_ident!("{}", if a.local { "Local" } else { causality });
+    let port = format_ident!("{}", a.port.unwrap_or("Regular"));
     let initial = format_ident!("{}", a.initial.unwrap_or("Calculated"));
     let (min, max, nominal) = (option(a.min.as_ref()), option(a.max.as_ref()), option(a.nominal.as_ref()));
     Ok(FieldTokens {
@@ -247,6 +251,7 @@ fn field_tokens(
                 causality: ::model::Causality::#field_causality,
                 tunable: #tunable,
                 discrete: #discrete,
+                port: ::model::PortLaw::#port,
                 initial: ::model::Initial::#initial,
                 start: &[#(#start),*],
                 min: #min,

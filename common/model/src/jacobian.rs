@@ -67,9 +67,35 @@ where
         // shifted by its norm: deflation is relative to the diagonal, which a chain of zero
         // eigenvalues does not have
         let shifted = m + Matrix::<f64, N, N>::from_diagonal_element(norm);
-        let lambda = shifted.try_schur(f64::EPSILON, MAX_ITERATIONS)?.complex_eigenvalues();
-        Some(std::array::from_fn(|i| (lambda[i].re - norm, lambda[i].im)))
+        let (_, t) = shifted.try_schur(f64::EPSILON, MAX_ITERATIONS)?.unpack();
+        Some(of_quasi_triangle(&t).map(|(re, im)| (re - norm, im)))
     }
+}
+
+/// Eigenvalues of a real Schur form: of its diagonal blocks of one or two rows.
+///
+/// A block of two whose eigenvalues are equal to rounding may have two real ones.
+fn of_quasi_triangle<const N: usize>(t: &Matrix<f64, N, N>) -> [(f64, f64); N] {
+    let mut lambda = [(0.0, 0.0); N];
+    let mut i = 0;
+    while i < N {
+        if i + 1 == N || t[(i + 1, i)] == 0.0 {
+            lambda[i] = (t[(i, i)], 0.0);
+            i += 1;
+            continue;
+        }
+        let mean = 0.5 * (t[(i, i)] + t[(i + 1, i + 1)]);
+        let half = 0.5 * (t[(i, i)] - t[(i + 1, i + 1)]);
+        let square = half * half + t[(i, i + 1)] * t[(i + 1, i)];
+        let root = square.abs().sqrt();
+        (lambda[i], lambda[i + 1]) = if square < 0.0 {
+            ((mean, root), (mean, -root))
+        } else {
+            ((mean + root, 0.0), (mean - root, 0.0))
+        };
+        i += 2;
+    }
+    lambda
 }
 
 #[cfg(test)]
@@ -95,6 +121,15 @@ mod tests {
         let largest = lambda.iter().map(|l| l.1).fold(0.0, f64::max);
         assert!((largest - 180.0_f64.sqrt()).abs() < 1e-10);
         assert!(lambda.iter().all(|l| l.0.abs() < 1e-4)); // a Jordan block of 2 at 1e-16: root of rounding
+    }
+
+    /// A block of two that is left over although its eigenvalues are real: equal to rounding, and apart.
+    #[test]
+    fn real_eigenvalues_of_a_block_of_two() {
+        let t = Matrix::<f64, 3, 3>::new(2.0, 1e-9, 0.0, 1e-9, 2.0, 0.0, 0.0, 0.0, 5.0);
+        let lambda = of_quasi_triangle(&t);
+        assert!((lambda[0].0 - 2.0 - 1e-9).abs() < 1e-15 && (lambda[1].0 - 2.0 + 1e-9).abs() < 1e-15);
+        assert!(lambda.iter().all(|l| l.1 == 0.0) && (lambda[2].0 - 5.0).abs() < 1e-15);
     }
 
     /// Companion matrix of (x - 1)(x - 2)(x + 3).

@@ -16,12 +16,14 @@
 #![forbid(unsafe_code)]
 #![allow(non_snake_case, reason = "port letters")]
 
+mod documentation;
 mod error;
 mod jacobian;
 mod leaf;
 mod system;
 mod variable;
 
+pub use documentation::{Documentation, Plot};
 pub use error::{EvaluationError, ParameterError};
 pub use jacobian::{Dense, Spectrum, directional, state_jacobian};
 pub use leaf::{NoVariables, SymmetricTensor, Vector3};
@@ -29,8 +31,8 @@ pub use mechanics::{Matrix, Scalar};
 pub use model_derive::{Enumeration, Variables};
 pub use system::{Experiment, Group, Model, Outputs, System, Visitor};
 pub use variable::{
-    Attributes, Causality, Entry, EnumType, Initial, Item, Kind, Rate, Variability, Variables, count_states,
-    fill,
+    Attributes, Causality, Entry, EnumType, Initial, Item, Kind, PortLaw, Rate, Variability, Variables,
+    count_states, fill,
 };
 
 // The derives name this crate by its path, also inside it.
@@ -59,7 +61,7 @@ mod tests {
     #[derive(Debug, Clone, Copy, PartialEq, Variables)]
     #[variables(output)]
     struct Out<S> {
-        #[var(prefix = "P.")]
+        #[var(prefix = "P.", sampled)]
         P: Port<S>,
         /// Angle of the link [rad]
         #[var(name = "angle.theta", approx, start = 0.5, nominal = 0.1)]
@@ -100,6 +102,7 @@ mod tests {
         let table = <Out<f64> as Variables<f64>>::TABLE;
         assert_eq!((table[0].unit, table[0].description), ("m", "Position"));
         assert_eq!(table[0].causality, Causality::Output);
+        assert_eq!((table[0].port, table[3].port), (PortLaw::Sampled, PortLaw::Regular));
         assert_eq!(table[4].causality, Causality::Local);
         assert_eq!((table[3].initial, table[3].start, table[3].nominal), (Initial::Approx, 0.5, 0.1));
         let mass = <Param as Variables<f64>>::TABLE[0];

@@ -4,7 +4,7 @@ use mechanics::Scalar;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::{EvaluationError, ParameterError, Spectrum, Variables};
+use crate::{Documentation, EvaluationError, ParameterError, Spectrum, Variables};
 
 /// A sensible run of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +42,8 @@ pub trait Model: Clone + Sized + 'static {
     const DESCRIPTION: &'static str;
     /// A sensible run
     const EXPERIMENT: Experiment;
+    /// Write-up, icon and reference run
+    const DOCUMENTATION: Documentation;
     /// Offered for Model Exchange too: the variables marked `state` are its continuous states
     const MODEL_EXCHANGE: bool = true;
     /// Inputs may follow polynomials inside a step (`port.*`); false: always held

@@ -76,6 +76,17 @@ pub enum Initial {
     Calculated,
 }
 
+/// What a port does that the inertial connection does not expect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PortLaw {
+    /// Nothing: the force is affine in the acceleration, the motion continuous
+    Regular,
+    /// A follower whose force is not affine in the acceleration: F0 and M are tangent values
+    NotAffine,
+    /// A leader whose motion is known at samples only
+    Sampled,
+}
+
 /// One scalar variable.
 #[derive(Debug, Clone, Copy)]
 pub struct Entry {
@@ -105,6 +116,8 @@ pub struct Entry {
     pub depends: &'static [&'static str],
     /// Present for a state
     pub rate: Option<Rate>,
+    /// Of the port that the variable belongs to
+    pub port: PortLaw,
 }
 
 /// What belongs to the time derivative of a state.
@@ -131,6 +144,8 @@ pub struct Attributes {
     pub tunable: bool,
     /// Changes at events only
     pub discrete: bool,
+    /// What the port does whose variables these are
+    pub port: PortLaw,
     /// What the start value means
     pub initial: Initial,
     /// Start values: none, one for all, or one per component
@@ -183,6 +198,7 @@ impl Entry {
             nominal: 1.0,
             depends: &[],
             rate: None,
+            port: PortLaw::Regular,
         }
     }
 
@@ -224,6 +240,9 @@ impl Entry {
             && matches!(self.variability, Variability::Continuous)
         {
             self.variability = Variability::Fixed;
+        }
+        if !matches!(a.port, PortLaw::Regular) {
+            self.port = a.port;
         }
         if !matches!(a.initial, Initial::Calculated) {
             self.initial = a.initial;

@@ -1,8 +1,8 @@
 //! A ball that bounces on the ground and is kicked once: state and time events with closed-form times.
 
 use model::{
-    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, Scalar, System, Variables,
-    Visitor,
+    Dense, Documentation, EvaluationError, Experiment, Model, NoVariables, ParameterError, Scalar, System,
+    Variables, Visitor,
 };
 
 /// Gravity [m/s2]
@@ -46,6 +46,7 @@ impl Model for Ball {
     const NAME: &'static str = "ball";
     const DESCRIPTION: &'static str = "Bouncing ball";
     const EXPERIMENT: Experiment = Experiment { stop: 1.0, step: 0.1 };
+    const DOCUMENTATION: Documentation = crate::UNDOCUMENTED;
     const INDICATORS: &'static [&'static str] = &["ground.distance"];
     type Parameters = Parameters;
     type Inputs<S: Scalar> = NoVariables;

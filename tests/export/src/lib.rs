@@ -7,7 +7,17 @@ pub mod rod;
 pub mod sparsity;
 
 use fmu_export::{Fault, Instance, Interface, Table};
-use model::{Kind, Model};
+use model::{Documentation, Kind, Model};
+
+/// For models that are never packed.
+pub(crate) const UNDOCUMENTED: Documentation = Documentation {
+    text: "",
+    icon_svg: "",
+    icon_png: &[],
+    reference: "",
+    reference_inputs: None,
+    plots: &[],
+};
 
 /// An instance whose variables are addressed by name.
 #[derive(Debug)]

@@ -5,8 +5,8 @@
 //! ```
 
 use model::{
-    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, Scalar, System, Variables,
-    Visitor,
+    Dense, Documentation, EvaluationError, Experiment, Model, NoVariables, ParameterError, Scalar, System,
+    Variables, Visitor,
 };
 
 /// Parameters.
@@ -87,6 +87,7 @@ impl Model for Rod {
     const NAME: &'static str = "rod";
     const DESCRIPTION: &'static str = "Follower with one state";
     const EXPERIMENT: Experiment = Experiment { stop: 1.0, step: 0.1 };
+    const DOCUMENTATION: Documentation = crate::UNDOCUMENTED;
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;

@@ -42,7 +42,7 @@ fn leaf(xml: &mut Xml, name: &str, attributes: &[(&str, String)]) -> io::Result<
 }
 
 /// A number as XML writes it: shortest text that gives the same bits.
-fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     let text = format!("{value:?}");
     text.strip_suffix(".0").map_or(text.clone(), String::from)
 }
@@ -62,7 +62,7 @@ fn root<M: Model>(standard: Standard, table: &Table, token: &'static str) -> Att
 }
 
 /// Dimensionless numbers have the unit 1.
-fn unit_name(unit: &'static str) -> &'static str {
+pub(crate) fn unit_name(unit: &'static str) -> &'static str {
     if unit.is_empty() { "1" } else { unit }
 }
 

@@ -1,25 +1,9 @@
-//! FMU `primary_oscillator`: a chain of one or two masses, driven, on the ground or on a moving base.
-//!
-//! ```text
-//! T_1 = C_1 (v_1 - v_A) + K_1 (s_1 - s_A),   T_2 = C_2 (v_2 - v_1) + K_2 (s_2 - s_1)
-//! M_1 s_1'' = -T_1 + T_2 - K_g s_1 - C_g v_1 + F_e1,   M_2 s_2'' = -T_2 + F_e2;   mass p: + P.F - P.M s_p''   (27)
-//! F_e = amplitude sin(omega_start t + sweep t^2/2 + phase) + drive.force
-//! ```
-//! In space the chain moves along e; E = 1 - e e^T, slot load (F, M), mu = e . M e, nu = E M e, m' = M_p + mu:
-//! ```text
-//! r_P = A.r + (s_p - s_A) e,   s_A = e . A.r minus its value at the start;   without base r_P = origin + s_p e
-//! s_p'' = s_p0'' - nu . a_A/m',   A.F0 = (M_r + sum M_i) g + T_1 e + E F - nu s_p0''                      (28)
-//! A.M = M_r 1 + sum M_i E + E M E - nu nu^T/m'
-//! A.F = (M_r + sum M_i) g + T_1 e + E (F - M a_P) - M_r a_A - sum M_i E a_A
-//! ```
-//! s counts from the rest position under the chain's own weight, so that gravity acts on the base only.
-//!
-//! Source: absorber specification, section 6.
+#![doc = include_str!("primary_oscillator.md")]
 
 use mechanics::{Load, Scalar};
 use model::{
-    Dense, EvaluationError, Experiment, Matrix, Model, ParameterError, Spectrum, SymmetricTensor, System,
-    Vector3, Visitor,
+    Dense, Documentation, EvaluationError, Experiment, Matrix, Model, ParameterError, Spectrum,
+    SymmetricTensor, System, Vector3, Visitor,
 };
 use serde::{Deserialize, Serialize};
 
@@ -234,6 +218,13 @@ impl Model for PrimaryOscillator {
     const DESCRIPTION: &'static str =
         "Chain of one or two driven masses with a leader port, on the ground or on a moving base";
     const EXPERIMENT: Experiment = Experiment { stop: 10.0, step: 0.01 };
+    const DOCUMENTATION: Documentation = model::documentation!(
+        "primary_oscillator",
+        plots = [
+            ("Displacement of the mass", ["s[1]"]),
+            ("Energies", ["energy.supplied", "energy.dissipated", "energy.kinetic"])
+        ]
+    );
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;

@@ -1,13 +1,9 @@
-//! FMU `bushing`: spring and damper between two leaders, the compliant joint of closed loops.
-//!
-//! ```text
-//! A.F = -k (r_A - r_B) - c (v_A - v_B),   B.F = -A.F,   A.M = B.M = 0
-//! ```
+#![doc = include_str!("bushing.md")]
 
 use mechanics::Scalar;
 use model::{
-    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, SymmetricTensor, System,
-    Variables, Vector3, Visitor,
+    Dense, Documentation, EvaluationError, Experiment, Model, NoVariables, ParameterError, SymmetricTensor,
+    System, Variables, Vector3, Visitor,
 };
 
 use crate::port::Root;
@@ -109,6 +105,14 @@ impl Model for Bushing {
     const NAME: &'static str = "bushing";
     const DESCRIPTION: &'static str = "Spring and damper without mass between the leaders at A and B";
     const EXPERIMENT: Experiment = Experiment { stop: 1.0, step: 0.001 };
+    const DOCUMENTATION: Documentation = model::documentation!(
+        "bushing",
+        inputs,
+        plots = [
+            ("Force on both leaders", ["A.F.z", "B.F.z"]),
+            ("Energies", ["energy.potential", "energy.dissipated", "energy.supplied"])
+        ]
+    );
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = NoVariables;

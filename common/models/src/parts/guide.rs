@@ -1,18 +1,9 @@
-//! FMU `guide`: a leader that moves as prescribed, in space at P and in one coordinate at H.
-//!
-//! ```text
-//! min_jerk   s = start + (end - start) (10 tau^3 - 15 tau^4 + 6 tau^5),   tau = (t - t0)/duration in 0 .. 1
-//! sine       s = start + amplitude sin(omega t + phase)
-//! rest       s = start
-//! P.load = P.F - P.M a_P                                   what its followers put on it
-//! energy.port = integral of P.load . v_P + H.load v_H
-//! ```
-//! Source of the polynomial: Flash & Hogan (1985), J. Neurosci. 5, minimum-jerk motion from rest to rest.
+#![doc = include_str!("guide.md")]
 
 use mechanics::Scalar;
 use model::{
-    Dense, Enumeration, EvaluationError, Experiment, Model, NoVariables, ParameterError, System, Variables,
-    Vector3, Visitor,
+    Dense, Documentation, Enumeration, EvaluationError, Experiment, Model, NoVariables, ParameterError,
+    System, Variables, Vector3, Visitor,
 };
 use serde::{Deserialize, Serialize};
 
@@ -308,6 +299,10 @@ impl Model for Guide {
     const DESCRIPTION: &'static str =
         "Leader with prescribed motion: minimum jerk, sine or rest, in space at P and in one coordinate at H";
     const EXPERIMENT: Experiment = Experiment { stop: 2.0, step: 0.01 };
+    const DOCUMENTATION: Documentation = model::documentation!(
+        "guide",
+        plots = [("Position", ["P.r.z", "H.s"]), ("Acceleration", ["P.a.z", "H.a"])]
+    );
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;

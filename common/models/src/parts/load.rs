@@ -1,14 +1,9 @@
-//! FMU `load`: a force that is a law of time, on the leader at A.
-//!
-//! ```text
-//! A.F = A.F0 = F(t),   A.M = 0                          the law of [`crate::force_law`]
-//! energy.supplied = integral of F . v_A
-//! ```
+#![doc = include_str!("load.md")]
 
 use mechanics::Scalar;
 use model::{
-    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, SymmetricTensor, System,
-    Variables, Vector3, Visitor,
+    Dense, Documentation, EvaluationError, Experiment, Model, NoVariables, ParameterError, SymmetricTensor,
+    System, Variables, Vector3, Visitor,
 };
 
 use crate::force_law::{LoadLaw, LoadParameters, PulsePhase};
@@ -80,6 +75,8 @@ impl Model for Load {
     const DESCRIPTION: &'static str =
         "Force as a law of time on the leader at A: constant, sine and half-sine pulse";
     const EXPERIMENT: Experiment = Experiment { stop: 10.0, step: 0.05 };
+    const DOCUMENTATION: Documentation =
+        model::documentation!("load", plots = [("Force on the leader", ["A.F.z"])]);
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = NoVariables;

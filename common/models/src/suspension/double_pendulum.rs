@@ -1,12 +1,9 @@
-//! FMU `double_pendulum`: two rods on a fixed point, a leader port at the tip.
-//!
-//! Source: suspension specification 6.3; the assembly of [`mechanics::assembly`], both rods in x-z.
-//! theta = 0 is along +x, -pi/2 is hanging.
+#![doc = include_str!("double_pendulum.md")]
 
 use mechanics::{Assembly, Member, Parent, Place, Planar, Scalar, Vector};
 use model::{
-    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, System, Variables, Vector3,
-    Visitor,
+    Dense, Documentation, EvaluationError, Experiment, Model, NoVariables, ParameterError, System, Variables,
+    Vector3, Visitor,
 };
 
 use super::element::field;
@@ -116,6 +113,14 @@ impl Model for DoublePendulum {
     const NAME: &'static str = "double_pendulum";
     const DESCRIPTION: &'static str = "Planar double pendulum of two rods with a leader port at the tip";
     const EXPERIMENT: Experiment = Experiment { stop: 3.0, step: 0.02 };
+    const DOCUMENTATION: Documentation = model::documentation!(
+        "double_pendulum",
+        plots = [
+            ("Angles", ["upper.angle.theta", "lower.angle.theta"]),
+            ("Force on the ground", ["A.F.x", "A.F.z"]),
+            ("Energies", ["energy.kinetic", "energy.potential"])
+        ]
+    );
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;

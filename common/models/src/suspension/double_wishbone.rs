@@ -1,12 +1,12 @@
-//! The double wishbone as a model: parameters checked, structure chosen, equations in named groups.
+#![doc = include_str!("double_wishbone.md")]
 
 use mechanics::{
     Assembly, ClosingJoint, Dim, Member, Parent, Place, Planar, Rigid, Scalar, Space, Spatial, SpringDamper,
     Vector, conditioning, magnitude,
 };
 use model::{
-    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, Spectrum, SymmetricTensor,
-    System, Vector3, Visitor,
+    Dense, Documentation, EvaluationError, Experiment, Model, NoVariables, ParameterError, Spectrum,
+    SymmetricTensor, System, Vector3, Visitor,
 };
 
 use super::coordinates::{Coordinates, Orientation};
@@ -50,6 +50,14 @@ impl Model for DoubleWishbone {
     const NAME: &'static str = "double_wishbone";
     const DESCRIPTION: &'static str = "Double wishbone wheel suspension: two links, carrier with wheel, strut, closed at the upper chassis joint";
     const EXPERIMENT: Experiment = Experiment { stop: 10.0, step: 0.05 };
+    const DOCUMENTATION: Documentation = model::documentation!(
+        "double_wishbone",
+        plots = [
+            ("Angle of the lower link (figure 18 of the paper, absolute)", ["lower.angle.theta"]),
+            ("Forces on the chassis", ["A.F.z", "D.F.z", "T.F.z"]),
+            ("Energies", ["energy.supplied", "energy.dissipated", "energy.kinetic"])
+        ]
+    );
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;

@@ -1,19 +1,11 @@
-//! FMU `four_bar`: crank, coupler and rocker between two ground points.
-//!
-//! ```text
-//! A -> crank -> B -> coupler -> C  closed with  D -> rocker -> C        (18)
-//! ```
-//!
-//! Source: suspension specification 6.3; the assembly of [`mechanics::assembly`], all links in x-z.
-//! Lengths and start angles follow from the design points. The change point (all links aligned) is
-//! passed with the minimum-norm closing force.
+#![doc = include_str!("four_bar.md")]
 
 use mechanics::{
     Assembly, Baumgarte, ClosingJoint, Member, Parent, Place, Planar, Scalar, Vector, conditioning, magnitude,
 };
 use model::{
-    Dense, EvaluationError, Experiment, Model, NoVariables, ParameterError, System, Variables, Vector3,
-    Visitor,
+    Dense, Documentation, EvaluationError, Experiment, Model, NoVariables, ParameterError, System, Variables,
+    Vector3, Visitor,
 };
 
 use super::element::field;
@@ -172,6 +164,14 @@ impl Model for FourBar {
     const NAME: &'static str = "four_bar";
     const DESCRIPTION: &'static str = "Planar four-bar linkage with a leader port on the coupler";
     const EXPERIMENT: Experiment = Experiment { stop: 5.0, step: 0.02 };
+    const DOCUMENTATION: Documentation = model::documentation!(
+        "four_bar",
+        plots = [
+            ("Angles of coupler and rocker", ["coupler.angle.theta", "rocker.angle.theta"]),
+            ("Forces on the ground", ["A.F.x", "A.F.z", "D.F.x"]),
+            ("Energies", ["energy.kinetic", "energy.potential"])
+        ]
+    );
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;

@@ -1,12 +1,9 @@
-//! FMU `link2`: a rod with follower port A at its joint and leader port B at its tip.
-//!
-//! Source: suspension specification 2.1-2.3, 6.1; after Kracht et al. (2017). The equations are those of
-//! [`super::element`]. Only forces cross ports; the moment that the joint passes on is an output.
+#![doc = include_str!("link2.md")]
 
 use mechanics::{Dim, Planar, Pose, Rigid, Scalar, Space, Spatial, Vector};
 use model::{
-    Dense, Enumeration, EvaluationError, Experiment, Model, ParameterError, Spectrum, SymmetricTensor,
-    System, Variables, Vector3, Visitor,
+    Dense, Documentation, Enumeration, EvaluationError, Experiment, Model, ParameterError, Spectrum,
+    SymmetricTensor, System, Variables, Vector3, Visitor,
 };
 
 use super::coordinates::{Coordinates, Orientation};
@@ -186,6 +183,10 @@ impl Model for Link2 {
     const DESCRIPTION: &'static str =
         "Rigid rod with follower port A at its joint and leader port B at its tip";
     const EXPERIMENT: Experiment = Experiment { stop: 2.0, step: 0.01 };
+    const DOCUMENTATION: Documentation = model::documentation!(
+        "link2",
+        plots = [("Angle of the rod", ["angle.theta"]), ("Force on the leader at A", ["A.F.x", "A.F.z"])]
+    );
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;

@@ -1,17 +1,9 @@
-//! FMU `link3`: the carrier, a rigid body with follower port B, leader port C and force point P.
-//!
-//! Body axes are parallel to the world in the design position, not along B - C. Port P has two slots
-//! and may carry the internal load. With `root = C` the element hangs at C: port names are roles, so
-//! that port B then sits at the physical C and port C at the physical B; com, C and P are still given
-//! from B.
-//!
-//! Source: suspension specification 2.4, 6.1; after Kracht et al. (2017). The equations are those of
-//! [`super::element`].
+#![doc = include_str!("link3.md")]
 
 use mechanics::{Dim, Load, Planar, Pose, Rigid, Scalar, Space, Spatial, Vector};
 use model::{
-    Dense, Enumeration, EvaluationError, Experiment, Model, ParameterError, Spectrum, SymmetricTensor,
-    System, Variables, Vector3, Visitor,
+    Dense, Documentation, Enumeration, EvaluationError, Experiment, Model, ParameterError, Spectrum,
+    SymmetricTensor, System, Variables, Vector3, Visitor,
 };
 
 use super::coordinates::{Coordinates, Orientation};
@@ -258,6 +250,10 @@ impl Model for Link3 {
     const DESCRIPTION: &'static str =
         "Rigid carrier with follower port B, leader port C and force point P with two slots";
     const EXPERIMENT: Experiment = Experiment { stop: 2.0, step: 0.01 };
+    const DOCUMENTATION: Documentation = model::documentation!(
+        "link3",
+        plots = [("Angle of the carrier", ["angle.psi"]), ("Force on the leader at B", ["B.F.x", "B.F.z"])]
+    );
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;

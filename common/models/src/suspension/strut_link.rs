@@ -1,18 +1,11 @@
-//! FMU `strut_link`: a rod with a spring-damper between its point S and the chassis point T.
-//!
-//! Follower port D at its joint, leader port C at its tip, massless force port T. With `root = C` the
-//! element hangs at its other end: port names are roles, so that port D then sits at the physical C and
-//! port C at the physical D; com and s1 are still given from D.
-//!
-//! Source: suspension specification 2.5, 6.1; after Kracht et al. (2017). The equations are those of
-//! [`super::element`] and (15), (16) of [`mechanics::spring`].
+#![doc = include_str!("strut_link.md")]
 
 use mechanics::{
     Dim, Load, Planar, Point, Pose, Rigid, Scalar, Space, Spatial, SpringDamper, SpringState, Vector,
 };
 use model::{
-    Dense, Enumeration, EvaluationError, Experiment, Model, ParameterError, Spectrum, SymmetricTensor,
-    System, Variables, Vector3, Visitor,
+    Dense, Documentation, Enumeration, EvaluationError, Experiment, Model, ParameterError, Spectrum,
+    SymmetricTensor, System, Variables, Vector3, Visitor,
 };
 
 use super::coordinates::{Coordinates, Orientation};
@@ -260,6 +253,13 @@ impl Model for StrutLink {
     const NAME: &'static str = "strut_link";
     const DESCRIPTION: &'static str = "Rigid rod with a spring-damper to the chassis, follower port D at its joint and leader port C at its tip";
     const EXPERIMENT: Experiment = Experiment { stop: 2.0, step: 0.01 };
+    const DOCUMENTATION: Documentation = model::documentation!(
+        "strut_link",
+        plots = [
+            ("Angle of the rod", ["angle.theta"]),
+            ("Force on the leader at D, tension of the strut", ["D.F.x", "D.F.z", "strut.force"])
+        ]
+    );
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;

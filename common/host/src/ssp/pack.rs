@@ -1,0 +1,60 @@
+//! Packing: a scene's folder and its FMUs into one archive, the same bytes for the same files.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+use super::{Package, SspError, outside_reference};
+
+/// Packs a folder with its FMUs and its reference results; the result lists the entries.
+///
+/// # Errors
+/// A scene that cannot be read, an FMU that is missing, an archive that cannot be written.
+pub fn pack(folder: &Path, fmus: &Path, references: &Path, output: &Path) -> Result<Vec<String>, SspError> {
+    let package = Package::open(folder)?;
+    let system = package.system()?;
+    let mut files = BTreeMap::new();
+    collect(folder, "", &mut files)?;
+    for component in &system.components {
+        let fmu = package.fmu(&component.source, fmus)?;
+        files.insert(component.source.clone(), fmu.path().to_owned());
+    }
+    if let Some(file) = &system.settings.reference {
+        let outside = outside_reference(references, file);
+        if !files.contains_key(file) && outside.is_file() {
+            files.insert(file.clone(), outside);
+        }
+    }
+    let written = |source: io::Error| SspError::Io { path: output.into(), source };
+    let mut zip = ZipWriter::new(File::create(output).map_err(written)?);
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .last_modified_time(DateTime::default());
+    for (name, path) in &files {
+        let content = fs::read(path).map_err(|source| SspError::Io { path: path.clone(), source })?;
+        zip.start_file(name.as_str(), options).map_err(|e| written(e.into()))?;
+        zip.write_all(&content).map_err(written)?;
+    }
+    zip.finish().map_err(|e| written(e.into()))?;
+    Ok(files.into_keys().collect())
+}
+
+/// Files below a folder by their names in the archive; links are left out.
+fn collect(folder: &Path, prefix: &str, files: &mut BTreeMap<String, PathBuf>) -> Result<(), SspError> {
+    let failed = |source| SspError::Io { path: folder.into(), source };
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let kind = entry.file_type().map_err(failed)?;
+        let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+        if kind.is_dir() {
+            collect(&entry.path(), &format!("{name}/"), files)?;
+        } else if kind.is_file() {
+            files.insert(name, entry.path());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,127 @@
+"""The scenes of the project. `scripts/scenes` writes them to `scenes/<name>/SystemStructure.ssd`.
+
+with library.scene("double_wishbone") as scene:
+    scene.run(integrator="rk4", step=0.05)
+"""
+
+from collections.abc import Callable
+from math import pi
+
+from .fmu import Value
+from .scene import Scene
+
+GRAVITY = -9.81
+
+
+def two_mass(scene: Scene, root_mass: float = 3.0):
+    """A mass on a ground spring leads one on a spring of its own, whose foot carries a rigid mass: the ratio of the
+    masses decides whether a plain exchange of forces is stable."""
+    still: dict[str, Value] = {"drive.amplitude": 0.0, "mass[1]": 1.0}
+    ground = {"ground.stiffness": 10.0, "ground.damping": 0.1}
+    leader = {"stiffness[1]": 10.0, "damping[1]": 0.1, "s[1].start": 1.0}
+    follower = {"stiffness[1]": 100.0, "damping[1]": 0.5, "use.base": True, "root.mass": root_mass}
+    scene.add("leader", "primary_oscillator", **still, **leader)
+    scene.add("follower", "primary_oscillator", **still, **follower, **ground)
+    scene.connect("leader.P", "follower.A")
+    scene.record("leader.s[1]", "leader.v[1]", "follower.s[1]", "follower.v[1]", interval=0.01)
+    scene.configure(stop=2.0)
+    scene.reference = "extra/coupling/two_mass.csv"
+
+
+def double_pendulum(scene: Scene):
+    """Two uniform rods, released level."""
+    rod = {"mass": 1.0, "length": 1.0, "angle.theta": 0.0, "gravity.z": GRAVITY}
+    scene.add("upper", "link2", **rod)
+    scene.add("lower", "link2", **rod, **{"A.r.x": 1.0})
+    scene.connect("upper.B", "lower.A")
+    scene.record(*_angles("upper", "lower"), interval=0.01)
+    scene.configure(stop=2.0)
+    scene.reference = "extra/coupling/double_pendulum.csv"
+
+
+def four_bar(scene: Scene):
+    """Three uniform rods between two ground points, released; the tips of the second and the third are joined."""
+    # angles from hanging
+    rods = {"link1": (1.0, 1.0, 1.0), "link2": (2.0, 2.0, 2.854723658638), "link3": (1.5, 1.5, -2.735431992820)}
+    for name, (mass, length, phi) in rods.items():
+        rod = {"mass": mass, "length": length, "angle.theta": phi - 0.5 * pi, "gravity.z": GRAVITY}
+        scene.add(name, "link2", **rod)
+    scene.set("link3", **{"A.r.x": 2.0})
+    scene.connect("link1.B", "link2.A")
+    scene.close("link2.B", "link3.B", alpha=2.0)
+    scene.record(*_angles("link1", "link2", "link3"), interval=0.015)
+    scene.configure(stop=3.0)
+    scene.reference = "extra/coupling/four_bar.csv"
+
+
+#: The paper's case: no weight, a force of 10 N at the wheel.
+_WEIGHTLESS: dict[str, Value] = {"gravity.z": 0.0}
+_SINE: dict[str, Value] = {"force.amplitude.z": 10.0, "force.omega.z": 10.0}
+_LOADED: dict[str, Value] = {"force.kind": "internal", **_SINE}
+
+
+def double_wishbone(scene: Scene, load: bool = True):
+    """The wheel suspension from its elements, closed at the carrier's upper joint (figure 16 of the paper).
+
+    `load`: the force at the wheel is a component of its own, otherwise it is the carrier's internal one.
+    """
+    scene.add("lower", "link2", **_WEIGHTLESS)
+    scene.add(
+        "carrier", "link3", **_WEIGHTLESS, **({"force.kind": "input"} if load else {"force.kind": "internal", **_SINE})
+    )
+    scene.add("upper", "strut_link", **_WEIGHTLESS)
+    scene.connect("lower.B", "carrier.B")
+    if load:
+        scene.add("load", "load", **_SINE)
+        scene.connect("carrier.P", "load.A")
+    scene.close("carrier.C", "upper.C", alpha=20.0)
+    _wishbone_run(scene, "extra/suspension/wishbone_paper.csv")
+
+
+def double_wishbone_two_chain(scene: Scene):
+    """The same from two mirrored chains, each with all bodies; each gives the force at the other's tip (figure 15)."""
+    theta1, psi = -0.04995839572194276, 0.0
+    scene.add("lower", "link2", **_WEIGHTLESS)
+    scene.add("carrier", "link3", **_WEIGHTLESS, **_LOADED, **{"angle.psi": psi})
+    scene.add("upper", "strut_link", **_WEIGHTLESS, root="C")
+    scene.add("upper_2", "strut_link", **_WEIGHTLESS)
+    scene.add("carrier_2", "link3", **_WEIGHTLESS, **_LOADED, **{"angle.psi": psi}, root="C")
+    scene.add("lower_2", "link2", **_WEIGHTLESS, **{"angle.theta": theta1 + pi})
+    scene.connect("lower.B", "carrier.B")
+    scene.connect("carrier.C", "upper.D")
+    scene.connect("upper_2.C", "carrier_2.B")
+    scene.connect("carrier_2.C", "lower_2.A")
+    # a tip that ends at a resting joint receives minus the force that the other chain reports there
+    scene.connect("upper_2.D", "upper.C", raw=True, factor=-1.0, motion=False)
+    scene.connect("lower.A", "lower_2.B", raw=True, factor=-1.0, motion=False)
+    _wishbone_run(scene, "extra/suspension/wishbone_paper.csv")
+    # where both chains have the lower and the upper joint of the carrier: their distance is not held
+    scene.record(*(f"{point}.r.{i}" for point in ("lower.B", "carrier_2.C", "carrier.C", "upper_2.C") for i in "xz"))
+    scene.configure(integrator="rk4", step=0.005)
+
+
+def _wishbone_run(scene: Scene, reference: str):
+    names = [*_angles("lower"), "carrier.angle.psi", "carrier.angle_rate.psi", *_angles("upper")]
+    scene.record(*names, "carrier.P.r.x", "carrier.P.r.z", interval=0.05)
+    scene.configure(stop=10.0)
+    scene.reference = reference
+
+
+def _angles(*components: str) -> list[str]:
+    return [f"{name}.{state}.theta" for name in components for state in ("angle", "angle_rate")]
+
+
+SCENES: dict[str, Callable[..., None]] = {
+    build.__name__: build for build in (two_mass, double_pendulum, four_bar, double_wishbone, double_wishbone_two_chain)
+}
+
+
+def scene(name: str, fmus=None, **options) -> Scene:
+    """A scene of the library; options are those of its function, `fmus` as of `Scene`."""
+    made = Scene(name, fmus)
+    try:
+        SCENES[name](made, **options)
+    except BaseException:
+        made.close_fmus()
+        raise
+    return made

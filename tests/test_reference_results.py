@@ -1,0 +1,233 @@
+"""The reference results inside the archives: against solutions computed here or elsewhere, and against a run as anybody
+would make it."""
+
+import zipfile
+
+import numpy as np
+import pytest
+from koppel import Reference, Result, paths
+from koppel.reference_results import run, shaken
+from oracle.element import Element, Strut, by_hinge
+from scipy.integrate import solve_ivp
+
+NAMES = sorted(manifest.parent.name for manifest in (paths.ROOT / "fmus").glob("*/Cargo.toml"))
+G = 9.80665
+TIGHT = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-15}
+
+
+@pytest.fixture
+def packed(fmu):
+    """`packed(name)`: the results in the archive."""
+
+    def read(name) -> Result:
+        with zipfile.ZipFile(paths.fmu(name)) as archive:
+            text = archive.read(f"extra/org.fmi-standard.fmi-ls-ref/{name}_ref.csv").decode()
+        header, *rows = text.splitlines()
+        values = np.array([row.split(",") for row in rows], dtype=float)
+        names = header.split(",")[1:]
+        nominal = {column: fmu(name).nominal(column) for column in names}
+        return Result(values[:, 0], names, values[:, 1:], nominal, {})
+
+    return read
+
+
+def compare(result, expected, limit):
+    """Error of each column of `expected`, relative to its largest value; the columns that are not compared and not zero."""
+    for name, column in expected.items():
+        column = np.broadcast_to(column, result.t.shape)
+        scale = max(np.abs(column).max(), 1e-3)
+        error = np.abs(result[name] - column).max() / scale
+        assert error <= limit, f"{name}: {error:.2e} of {scale:.3g}"
+    return [n for n in result.names if n not in expected and np.abs(result[n]).max() > 1e-12]
+
+
+# independent solutions --------------------------------------------------------------------------------------------
+def swing(element, root, angle, t, top=None):
+    """One element on a resting joint by the equations of `oracle.element`, integrated in its angle; also its reports."""
+    rest = (np.asarray(root), np.zeros(3), np.zeros(3))
+
+    def report(theta, rate, points=()):
+        return element.evaluate(by_hinge(0.0, theta, rate), rest, [], points, top=top)
+
+    def rhs(_, x):
+        # turning is about -y
+        found = report(*x[:2])
+        return [x[1], -found["alpha"][1].real, np.real(found.get("dissipated'", 0.0))]
+
+    path = solve_ivp(rhs, (0.0, t[-1]), [angle, 0.0, 0.0], t_eval=t, **TIGHT).y
+    return path, report
+
+
+ELEMENTS = {
+    "link2": (
+        Element(4.0, np.array([0.20024984394500786, 0, 0]), np.diag([2e-3, 4.0 * 0.1604 / 12, 4.0 * 0.1604 / 12]),
+                np.array([0, 0, -G]), True),
+        "A", [0, 0, 0], ("angle.theta", -0.04995839572194276), {"B": [0.4004996878900157, 0, 0]}, None,
+    ),
+    "link3": (
+        Element(25.0, np.array([0.08, 0, 0.14]), np.diag([1.2, 0.8, 0.8]), np.array([0, 0, -G]), True),
+        "B", [0.4, 0, -0.02], ("angle.psi", 0.0), {"C": [-0.04, 0, 0.29], "P": [0.1, 0, 0.14]}, None,
+    ),
+    "strut_link": (
+        Element(2.5, np.array([0.140356688476182, 0, 0]), np.diag([1e-3, 2.5 * 0.0788 / 12, 2.5 * 0.0788 / 12]),
+                np.array([0, 0, -G]), True, Strut(np.array([0.14, 0, 0]), 22000.0, 1000.0, 0.360025588795974, 0.0)),
+        "D", [0.08, 0, 0.25], ("angle.theta", 0.0713074647852904), {"C": [0.280713376952364, 0, 0]},
+        (np.array([0.22, 0, 0.62]), np.zeros(3)),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ELEMENTS)
+def test_elements(packed, name):
+    """Rod, carrier and strut let go under gravity: scipy's DOP853 over the oracle of the elements. 1e-9: twelve digits, and
+    the tolerance of both integrations over the run."""
+    element, port, root, (angle, start), tips, top = ELEMENTS[name]
+    result = packed(name)
+    (theta, rate, heat), report = swing(element, root, start, result.t, top)
+    points = [(tip, np.array(p, dtype=float)) for tip, p in tips.items()]
+    found = [report(*at, points) for at in zip(theta, rate)]
+    column = lambda pick: np.array([np.real(pick(one)) for one in found])
+    expected = {angle: theta, angle.replace("angle", "angle_rate"): rate, "energy.dissipated": heat}
+    expected |= {f"energy.{part}": column(lambda one: one[part]) for part in ("kinetic", "potential")}
+    expected["energy.supplied"] = expected["energy.port"] = 0.0
+    for axis, i in (("x", 0), ("y", 1), ("z", 2)):
+        expected |= {f"{port}.{force}.{axis}": column(lambda one: one[force][i]) for force in ("F", "F0")}
+        for tip in tips:
+            expected |= {f"{tip}.{of}.{axis}": column(lambda one: one[tip][of][i]) for of in "rva"}
+        if top:
+            expected |= {f"T.{force}.{axis}": column(lambda one: one["T.F"][i]) for force in ("F", "F0")}
+    for k, (i, j) in enumerate(zip(*np.triu_indices(3))):
+        expected[f"{port}.M.{('xx', 'xy', 'xz', 'yy', 'yz', 'zz')[k]}"] = column(lambda one: one["M"][i, j])
+    if top:
+        expected |= {f"strut.{part}": column(lambda one: one[part]) for part in ("length", "rate", "force")}
+    left_out = compare(result, expected, 1e-9)
+    # coordinates of the other joint kinds rest
+    assert all(np.ptp(result[n]) == 0.0 for n in left_out if not n.startswith("joint.moment")), left_out
+
+
+def test_double_wishbone(packed):
+    """The independent ODE of the paper's case, to the digits of both files."""
+    error = Reference.named("wishbone_paper").error_of(packed("double_wishbone"))
+    assert error.samples == 201
+    assert error.worst("angle").largest <= 1e-11, error.table()
+    assert error.e_max <= 1e-8, error.table()
+
+
+def test_four_bar(packed):
+    """The independent ODE over 55 rad of turning."""
+    reference = Reference.named("four_bar")
+    start = reference.parameters["parameters"]
+    x, z = np.subtract(start["C0"], start["B0"])
+    reference.values[:, reference.variables["coupler.angle.theta"]] += np.arctan2(z, x)
+    error = reference.error_of(packed("four_bar"))
+    assert error.samples == 251
+    assert error.e_max <= 1e-8, error.table()
+
+
+def test_double_pendulum(packed):
+    """Mass matrix of two uniform rods of 1 kg and 1 m with absolute angles, integrated here."""
+    result = packed("double_pendulum")
+
+    def rhs(_, x):
+        a, b, p, q = x
+        c, s = np.cos(a - b), np.sin(a - b)
+        M = [[4.0 / 3.0, 0.5 * c], [0.5 * c, 1.0 / 3.0]]
+        Q = [-0.5 * s * q * q - 1.5 * G * np.cos(a), 0.5 * s * p * p - 0.5 * G * np.cos(b)]
+        return [p, q, *np.linalg.solve(M, Q)]
+
+    a, b, p, q = solve_ivp(rhs, (0.0, 3.0), [-1.2, -1.0, 0.0, 0.0], t_eval=result.t, **TIGHT).y
+    accelerations = np.array([rhs(0.0, x)[2:] for x in zip(a, b, p, q)])
+    alpha, beta = accelerations.T
+    v_B, v_C = np.array([-np.sin(a), np.cos(a)]) * p, np.array([-np.sin(b), np.cos(b)]) * q
+    a_B = np.array([-np.sin(a) * alpha - np.cos(a) * p * p, np.cos(a) * alpha - np.sin(a) * p * p])
+    a_C = np.array([-np.sin(b) * beta - np.cos(b) * q * q, np.cos(b) * beta - np.sin(b) * q * q])
+    weight = np.array([[0.0], [-G]])
+    on_upper = weight - (a_B + 0.5 * a_C)
+    on_ground = on_upper + weight - 0.5 * a_B
+    potential = G * (0.5 * np.sin(a) + np.sin(a) + 0.5 * np.sin(b))
+    kinetic = (p * p + 0.25 * (q * q) + p * q * np.cos(a - b) + p * p / 3 + q * q / 12) / 2
+    expected = {
+        "upper.angle.theta": a, "lower.angle.theta": b, "upper.angle_rate.theta": p, "lower.angle_rate.theta": q,
+        "B.r.x": np.cos(a), "B.r.z": np.sin(a), "C.r.x": np.cos(a) + np.cos(b), "C.r.z": np.sin(a) + np.sin(b),
+        "C.v.x": (v_B + v_C)[0], "C.v.z": (v_B + v_C)[1], "C.a.x": (a_B + a_C)[0], "C.a.z": (a_B + a_C)[1],
+        "B.F.x": on_upper[0], "B.F.z": on_upper[1], "A.F.x": on_ground[0], "A.F.z": on_ground[1],
+        "energy.kinetic": kinetic, "energy.potential": potential,
+    }  # fmt: skip
+    assert compare(result, expected, 1e-9) == []
+
+
+def test_load(packed):
+    result = packed("load")
+    force = 10.0 * np.sin(10.0 * result.t)
+    assert compare(result, {"A.F.z": force, "A.F0.z": force}, 1e-11) == []
+
+
+def test_guide(packed):
+    result = packed("guide")
+    tau = np.minimum(result.t, 1.0)
+    s, v, a = (
+        0.1 * (10 * tau**3 - 15 * tau**4 + 6 * tau**5),
+        3.0 * (tau**2 - 2 * tau**3 + tau**4),
+        6.0 * (tau - 3 * tau**2 + 2 * tau**3),
+    )
+    expected = {"P.r.z": s, "H.s": s, "P.v.z": v, "H.v": v, "P.a.z": a, "H.a": a}
+    assert compare(result, expected, 1e-11) == []
+
+
+def test_bushing(packed):
+    """Closed form for the shaken end A."""
+    result = packed("bushing")
+    k, c, t = 1e6, 1e3, result.t
+    r, v, _ = (np.array(column) for column in zip(*map(shaken, t)))
+    F, stored = -k * r - c * v, 0.5 * k * r * r
+    heat = c * 0.02**2 * (0.5 * t + np.sin(40.0 * t) / 80.0)
+    expected = {
+        "A.F.z": F, "A.F0.z": F, "B.F.z": -F, "B.F0.z": -F,
+        "energy.potential": stored, "energy.dissipated": heat,
+        "energy.supplied": stored + heat, "energy.port": stored + heat,
+    }  # fmt: skip
+    assert compare(result, expected, 1e-10) == []
+
+
+def test_primary_oscillator(packed):
+    """Matrix exponential of mass, spring, damper and a sine as two more states, with the powers integrated by scipy."""
+    result = packed("primary_oscillator")
+    m, k, c, F, w = 100.0, 15791.367041742973, 25.132741228718345, 50.0, 4.0 * np.pi
+    t = result.t
+    # particular solution in resonance (k = m w^2): -F/(c w) cos(w t), and the decay that starts it from rest
+    assert k == pytest.approx(m * w * w, rel=1e-14)
+    delta = c / (2.0 * m)
+    nu = np.sqrt(k / m - delta**2)
+    decay = np.exp(-delta * t)
+    X = F / (c * w)
+    s = X * (decay * (np.cos(nu * t) + delta / nu * np.sin(nu * t)) - np.cos(w * t))
+    v = X * (w * np.sin(w * t) - decay * (k / m) / nu * np.sin(nu * t))
+    a = (F * np.sin(w * t) - c * v - k * s) / m
+    expected = {"s[1]": s, "v[1]": v, "P.s": s, "P.v": v, "P.a": a, "drive.omega": w}
+    expected |= {"energy.kinetic": 0.5 * m * v * v, "energy.potential": 0.5 * k * s * s}
+    left_out = compare(result, expected, 1e-9)
+    assert set(left_out) == {"energy.dissipated", "energy.supplied"}
+    balance = result["energy.supplied"] - result["energy.dissipated"] - expected["energy.kinetic"]
+    assert np.abs(balance - expected["energy.potential"]).max() <= 1e-9 * result["energy.supplied"][-1]
+    at = np.linspace(0.0, 10.0, 200_001)
+    fine = X * (w * np.sin(w * at) - np.exp(-delta * at) * (k / m) / nu * np.sin(nu * at))
+    heat = np.trapezoid(c * fine * fine, at)
+    assert result["energy.dissipated"][-1] == pytest.approx(heat, rel=1e-7)
+
+
+# a run at default settings ----------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", NAMES)
+def test_run_at_default_settings(fmu, packed, name):
+    """Steps of half the size take away at least half of the error, whatever the order: the error is at most twice the
+    difference, or rounding. And it is small: 1.1e-5 where the damper of `strut_link` makes its light rod fast (300 1/s),
+    1e-5 where the moving inputs of `bushing` are extrapolated, 1.4e-6 and less elsewhere."""
+    reference = packed(name)
+    coarse = run(fmu(name), {})
+    fine = run(fmu(name), {"solver.step": 5e-4}, refine=2)
+    assert np.abs(coarse.t - reference.t).max() <= 1e-11
+    scale = np.maximum(np.abs(reference.values).max(axis=0), list(reference.nominal.values()))
+    error = np.abs(coarse.values - reference.values).max(axis=0)
+    allowed = 2.0 * np.abs(coarse.values - fine.values).max(axis=0) + 1e-10 * scale
+    wrong = {n: (e, a) for n, e, a in zip(reference.names, error, allowed) if e > a}
+    assert not wrong
+    assert (error <= 2e-5 * scale).all(), dict(zip(reference.names, error / scale))
