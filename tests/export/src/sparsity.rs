@@ -7,7 +7,7 @@ use model::{Causality, Initial, Model};
 
 use crate::{Named, Random};
 
-/// Part of the largest derivative that counts as zero.
+/// Part of the largest derivative that counts as zero where terms cancel.
 const ROUNDING: f64 = 1e-13;
 
 /// What outputs and state derivatives of a model depend on.
@@ -29,9 +29,7 @@ impl<M: Model> Default for Sparsity<M> {
         };
         let states: Vec<u32> = fmu.table().states().iter().map(|s| number(*s)).collect();
         let name = |r: &u32| fmu.table().variables()[*r as usize].name.clone();
-        let continuous = |r: &u32| !name(r).starts_with("port.");
-        let knowns =
-            of(Causality::Input).filter(continuous).chain(states.iter().copied()).collect::<Vec<_>>();
+        let knowns = of(Causality::Input).chain(states.iter().copied()).collect::<Vec<_>>();
         let rates = states.iter().map(|s| fmu.reference(&format!("der({})", name(s))));
         let unknowns = of(Causality::Output).chain(rates).collect::<Vec<_>>();
         let observed = vec![vec![false; knowns.len()]; unknowns.len()];
@@ -91,15 +89,22 @@ impl<M: Model> Sparsity<M> {
         fmu.pass_event_mode(Interface::CoSimulationWithEvents).expect("Step Mode");
         fmu.step(1e-3).expect("a step");
         fmu.instance.enter_event_mode().expect("Event Mode");
+        self.observe(&mut fmu, ROUNDING);
+    }
+
+    /// Look at an instance where it stands; derivatives up to the part `rounding` of the largest by the same known are zero.
+    ///
+    /// # Panics
+    /// If a derivative has no value.
+    pub fn observe(&mut self, fmu: &mut Named<M>, rounding: f64) {
         let mut column = vec![0.0; self.unknowns.len()];
         for (j, known) in self.knowns.iter().enumerate() {
             fmu.instance
                 .directional_derivative(&self.unknowns, &[*known], &[1.0], &mut column)
                 .expect("a derivative");
-            // terms that cancel leave rounding behind
             let largest = column.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
             for (seen, d) in self.observed.iter_mut().zip(&column) {
-                seen[j] |= d.abs() > ROUNDING * largest;
+                seen[j] |= d.abs() > rounding * largest;
             }
         }
     }

@@ -6,8 +6,8 @@
 //! (they ignore the moment of the universal joint).
 //!
 //! World frame E right-handed, z up; plane scenes live in x-z. Equation numbers (1)-(12c) are those
-//! of [`mechanics::joint`] and [`mechanics::element`], (15)-(16) of [`mechanics::spring`], (17) of
-//! [`mechanics::chain`], (18) of [`mechanics::closure`].
+//! of [`mechanics::joint`] and [`mechanics::element`], (15)-(16) of [`mechanics::spring`], (17), (20) of
+//! [`mechanics::assembly`] and [`mechanics::drift`], (18) of [`mechanics::closure`].
 
 mod coordinates;
 pub mod double_pendulum;
