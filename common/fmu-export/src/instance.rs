@@ -1,5 +1,7 @@
 //! An instance of an FMU without its C boundary: life cycle and lazy outputs.
 
+use std::sync::Arc;
+
 use integrators::{Solver, Statistics};
 use model::{Kind, Model, ParameterError, Variability, Variables};
 use num_dual::Dual64;
@@ -18,7 +20,7 @@ pub(crate) const SAME_TIME: f64 = 1e-9;
 /// An instance.
 #[derive(Debug)]
 pub struct Instance<M: Model> {
-    pub(crate) table: Table,
+    pub(crate) table: Arc<Table>,
     pub(crate) state: State<M>,
     /// Inputs and outputs in dual numbers, kept so that derivatives allocate nothing
     pub(crate) duals: Vec<Dual64>,
@@ -47,7 +49,7 @@ impl<M: Model> Instance<M> {
     /// A new instance with all start values.
     #[must_use]
     pub fn with_interface(interface: Interface) -> Self {
-        let table = Table::new::<M>();
+        let table = Table::shared::<M>();
         let state = State::new(&table, interface);
         let channels = Channels::new(table.variables[Layout::<M>::INPUTS].iter().map(|v| {
             let e = &v.entry;
@@ -69,7 +71,7 @@ impl<M: Model> Instance<M> {
     /// Hash of the variable table.
     #[must_use]
     pub fn token() -> String {
-        Table::new::<M>().token(M::NAME)
+        Table::shared::<M>().token()
     }
 
     /// Messages of the last call about things that are allowed but probably not meant.

@@ -78,7 +78,7 @@ impl<M: Model> Instance<M> {
         let length = (bytes.len() + CHECKSUM) as u64;
         bytes[..HEAD[0]].copy_from_slice(&VERSION.to_le_bytes());
         bytes[HEAD[0]..HEAD[1]].copy_from_slice(&length.to_le_bytes());
-        bytes[HEAD[1]..HEAD[2]].copy_from_slice(&self.table.hash(M::NAME).to_le_bytes());
+        bytes[HEAD[1]..HEAD[2]].copy_from_slice(&self.table.hash.to_le_bytes());
         bytes.extend(checksum(&bytes).to_le_bytes());
         Ok(bytes)
     }
@@ -88,7 +88,7 @@ impl<M: Model> Instance<M> {
     /// # Errors
     /// [`SerialisedStateError`].
     pub fn deserialise(&self, bytes: &[u8]) -> Result<Box<State<M>>, Fault> {
-        let content = checked(bytes, self.table.hash(M::NAME))?;
+        let content = checked(bytes, self.table.hash)?;
         let (state, rest) = postcard::take_from_bytes::<State<M>>(content).map_err(|_| Content)?;
         if !rest.is_empty() || !state.fits(&self.table) {
             return Err(Content.into());

@@ -1,8 +1,10 @@
 //! The variables of an FMU: the model's and the solver's in one list. The value reference of a
 //! variable is its place in the list.
 
+use std::any::TypeId;
 use std::marker::PhantomData;
 use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use model::{Causality, Entry, Group, Kind, Model, Variability, Variables, count_states};
 
@@ -140,12 +142,28 @@ pub struct Table {
     pub(crate) access: Vec<u8>,
     /// Bits of the parts that depend on the variable
     pub(crate) affects: Vec<u8>,
+    /// Changes when the interface changes
+    pub(crate) hash: u128,
 }
 
 /// Marks Float64 variables in [`Table::access`].
 pub(crate) const FLOAT: u8 = 0x80;
 
+/// The tables of all models in the process; an FMU has one.
+static TABLES: Mutex<Vec<(TypeId, Arc<Table>)>> = Mutex::new(Vec::new());
+
 impl Table {
+    /// The table of the model `M`, made once in a process.
+    pub(crate) fn shared<M: Model>() -> Arc<Self> {
+        let mut tables = TABLES.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, table)) = tables.iter().find(|(model, _)| *model == TypeId::of::<M>()) {
+            return Arc::clone(table);
+        }
+        let table = Arc::new(Self::new::<M>());
+        tables.push((TypeId::of::<M>(), Arc::clone(&table)));
+        table
+    }
+
     /// The variables of the model `M`.
     #[must_use]
     pub fn new<M: Model>() -> Self {
@@ -165,7 +183,13 @@ impl Table {
 
         let access =
             variables.iter().map(|v| if v.entry.kind == Kind::Float64 { FLOAT } else { 0 }).collect();
-        let mut table = Self { affects: vec![0; variables.len()], variables, states, access };
+        let mut table = Self {
+            affects: vec![0; variables.len()],
+            hash: hash(M::NAME, &variables),
+            variables,
+            states,
+            access,
+        };
         table.affects[Layout::<M>::PARAMETERS].fill(ALL_PARTS);
         table.affects[Layout::<M>::INPUTS].fill(Part::Indicators.bit());
         for part in Part::ALL {
@@ -230,29 +254,29 @@ impl Table {
     }
 
     /// [Hash](Self::hash) of the variable table in the form of a GUID.
-    pub(crate) fn token(&self, model: &str) -> String {
-        guid(self.hash(model))
+    pub(crate) fn token(&self) -> String {
+        guid(self.hash)
     }
+}
 
-    /// Hash of the variable table: changes when the interface changes.
-    pub(crate) fn hash(&self, model: &str) -> u128 {
-        let mut hash = Fnv::new();
-        hash.write(model.as_bytes());
-        for Variable { name, entry, .. } in &self.variables {
-            hash.write(name.as_bytes());
-            hash.write(entry.unit.as_bytes());
-            hash.write(Standard::Fmi3.type_name(entry.kind).as_bytes());
-            if let Kind::Enumeration(t) = entry.kind {
-                t.items.iter().for_each(|i| hash.write(i.name.as_bytes()));
-            }
-            hash.write(format!("{:?}{:?}{:?}", entry.causality, entry.variability, entry.initial).as_bytes());
-            for value in [entry.start, entry.min, entry.max, entry.nominal] {
-                hash.write(&value.to_bits().to_le_bytes());
-            }
-            entry.depends.iter().for_each(|d| hash.write(d.as_bytes()));
+/// Hash of the variable table of a model.
+fn hash(model: &str, variables: &[Variable]) -> u128 {
+    let mut hash = Fnv::new();
+    hash.write(model.as_bytes());
+    for Variable { name, entry, .. } in variables {
+        hash.write(name.as_bytes());
+        hash.write(entry.unit.as_bytes());
+        hash.write(Standard::Fmi3.type_name(entry.kind).as_bytes());
+        if let Kind::Enumeration(t) = entry.kind {
+            t.items.iter().for_each(|i| hash.write(i.name.as_bytes()));
         }
-        hash.0
+        hash.write(format!("{:?}{:?}{:?}", entry.causality, entry.variability, entry.initial).as_bytes());
+        for value in [entry.start, entry.min, entry.max, entry.nominal] {
+            hash.write(&value.to_bits().to_le_bytes());
+        }
+        entry.depends.iter().for_each(|d| hash.write(d.as_bytes()));
     }
+    hash.0
 }
 
 /// A hash in the form of a GUID.

@@ -52,7 +52,7 @@ fn root<M: Model>(standard: Standard, table: &Table, token: &'static str) -> Att
     vec![
         ("fmiVersion", standard.version().into()),
         ("modelName", M::NAME.into()),
-        (token, table.token(M::NAME)),
+        (token, table.token()),
         ("description", M::DESCRIPTION.into()),
         ("version", env!("CARGO_PKG_VERSION").into()),
         ("license", "MIT OR Apache-2.0".into()),

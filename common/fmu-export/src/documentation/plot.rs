@@ -178,7 +178,7 @@ mod tests {
             Variable { name: name.into(), entry, derivative_of: None }
         };
         let variables = vec![variable("F", "N"), variable("G", "N"), variable("s", "m")];
-        let table = Table { variables, states: Vec::new(), access: Vec::new(), affects: Vec::new() };
+        let table = Table { variables, states: Vec::new(), access: Vec::new(), affects: Vec::new(), hash: 0 };
         let samples = Samples::parse("time,F,s\n0,1,2\n1,3,4\n").expect("a table");
         let draw = |signals| figure(&mut String::new(), &Plot { title: "T", signals }, &table, &samples);
         assert_eq!(draw(&["F"]), Ok(()));
