@@ -5,6 +5,8 @@
 //!                     ->  describe (modelDescription.xml)                 ->  package (.fmu)
 //! ```
 //!
+//! The C boundary calls an [`Exported`] instance: that of a model, or one that computes otherwise.
+//!
 //! An FMU crate is `fmu_export::export!(Model);` in its library and `fmu_export::run::<Model>()` in
 //! its program, which describes and packs it.
 
@@ -15,6 +17,7 @@ mod describe;
 mod documentation;
 mod events;
 mod exchange;
+mod exported;
 mod fault;
 mod inputs;
 mod instance;
@@ -22,6 +25,7 @@ mod jobs;
 mod package;
 mod phase;
 mod reference;
+mod resources;
 mod serialise;
 mod solver;
 mod standard;
@@ -35,6 +39,7 @@ mod values;
 pub use describe::model_description;
 pub use documentation::DocumentationError;
 pub use events::Event;
+pub use exported::{CreationError, Exported};
 pub use fault::{Fault, Status};
 pub use inputs::{InputTreatment, PortParameters, PortReset};
 pub use instance::Instance;
