@@ -19,7 +19,7 @@ mod events;
 mod exchange;
 mod exported;
 mod fault;
-mod inputs;
+pub mod inputs;
 mod instance;
 mod jobs;
 mod package;

@@ -83,7 +83,7 @@ mod statistics;
 
 pub use complex::Complex;
 pub use dense::Dense;
-pub use dynamic::{DynamicOde, ExplicitSolver, NotExplicit};
+pub use dynamic::{DynamicOde, ExplicitSolver, ExplicitState, NotExplicit};
 pub use error::{SettingsError, StepError};
 pub use events::{Crossing, Indicators, Reached};
 pub use exact::Transition;

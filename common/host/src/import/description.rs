@@ -45,6 +45,17 @@ pub enum Causality {
     Local,
 }
 
+/// What the start value of a computed variable means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Initial {
+    /// Given and kept
+    Exact,
+    /// Given as a guess
+    Approx,
+    /// Computed, or not said
+    Calculated,
+}
+
 /// A scalar variable.
 #[derive(Clone, Debug)]
 pub struct Variable {
@@ -64,8 +75,16 @@ pub struct Variable {
     pub unit: Option<String>,
     /// Name of its type
     pub declared_type: Option<String>,
+    /// Meaning
+    pub text: String,
     /// Start value as written
     pub start: Option<String>,
+    /// What the start value of a computed variable means
+    pub initial: Initial,
+    /// Smallest allowed value
+    pub min: Option<f64>,
+    /// Largest allowed value
+    pub max: Option<f64>,
     /// Typical magnitude
     pub nominal: f64,
     /// An array
@@ -80,6 +99,8 @@ pub struct Capabilities {
     pub identifier: String,
     /// States can be saved and restored
     pub state_saving: bool,
+    /// Saved states can be turned into bytes
+    pub serialised_states: bool,
     /// Directional derivatives
     pub directional_derivatives: bool,
     /// Event Mode in Co-Simulation
@@ -331,14 +352,16 @@ fn capabilities(
     let Some(e) = root.child(name) else {
         return Ok(None);
     };
-    let (save, derivatives, skips_completed) = match version {
+    let (save, serialise, derivatives, skips_completed) = match version {
         Version::V2 => (
             "canGetAndSetFMUstate",
+            "canSerializeFMUstate",
             "providesDirectionalDerivative",
             is_true(e, "completedIntegratorStepNotNeeded"),
         ),
         Version::V3 => (
             "canGetAndSetFMUState",
+            "canSerializeFMUState",
             "providesDirectionalDerivatives",
             !is_true(e, "needsCompletedIntegratorStep"),
         ),
@@ -346,6 +369,7 @@ fn capabilities(
     Ok(Some(Capabilities {
         identifier: required(e, "modelIdentifier")?.into(),
         state_saving: is_true(e, save),
+        serialised_states: is_true(e, serialise),
         directional_derivatives: is_true(e, derivatives),
         event_mode: version == Version::V3 && is_true(e, "hasEventMode"),
         completed_steps: !skips_completed,
@@ -423,7 +447,15 @@ fn variable(
         discrete: element.attribute("variability") == Some("discrete"),
         tunable: element.attribute("variability") == Some("tunable"),
         unit: typed.attribute("unit").map(String::from).or(of_type.0),
+        text: element.attribute("description").unwrap_or_default().into(),
         start: start.map(String::from),
+        initial: match element.attribute("initial") {
+            Some("exact") => Initial::Exact,
+            Some("approx") => Initial::Approx,
+            _ => Initial::Calculated,
+        },
+        min: optional(typed, "min")?,
+        max: optional(typed, "max")?,
         nominal: optional(typed, "nominal")?.or(of_type.1).unwrap_or(1.0),
         array: typed.child("Dimension").is_some(),
         declared_type,

@@ -2,7 +2,10 @@
 
 use std::ops::Range;
 
-use integrators::{DynamicOde, ExplicitSolver, NotExplicit, Settings, StepError};
+use integrators::{
+    DynamicOde, ExplicitSolver, ExplicitState, NotExplicit, Settings, Statistics, StepError,
+};
+use serde::{Deserialize, Serialize};
 
 use super::{Clock, Config, Progress, Steps, events};
 use crate::error::{Error, RunError};
@@ -24,10 +27,16 @@ pub(super) fn run(
 ) -> Result<Steps, Error> {
     start::initialise(sweeper, config)?;
     let mut run = Run::start(sweeper, config)?;
-    recorder.offer(run.ode.sweeper, config, run.t)?;
+    recorder.offer(sweeper, config, run.t)?;
     let begin = Clock::start();
     while run.t < config.stop {
-        run.step(config, recorder)?;
+        run.advance(sweeper, config, config.stop)?;
+        while let Some(sample) = recorder.due_before(config, run.reached()) {
+            run.look(sweeper, sample)?;
+            recorder.record(sweeper, sample)?;
+        }
+        run.accept(sweeper)?;
+        recorder.offer(sweeper, config, run.t)?;
         progress(run.t);
     }
     let (seconds, cpu) = begin.read();
@@ -46,7 +55,7 @@ pub(super) fn run(
 /// The right-hand side of the whole scene.
 struct Whole<'a> {
     sweeper: &'a mut Sweeper,
-    ranges: Vec<Range<usize>>,
+    ranges: &'a [Range<usize>],
 }
 
 impl DynamicOde for Whole<'_> {
@@ -74,6 +83,7 @@ impl Whole<'_> {
     fn place(&mut self, t: f64, x: &[f64]) -> Result<(), RunError> {
         let moved = t.to_bits() != self.sweeper.t.to_bits();
         self.sweeper.t = t;
+        self.sweeper.drive(t)?;
         for (node, range) in self.ranges.iter().enumerate() {
             let instance = &mut self.sweeper.instances[node];
             let mut result = if moved { instance.set_time(t) } else { Ok(()) };
@@ -87,7 +97,7 @@ impl Whole<'_> {
 
     /// States out of the FMUs.
     fn fetch(&mut self, x: &mut [f64]) -> Result<(), RunError> {
-        let ranges = &self.ranges;
+        let ranges = self.ranges;
         self.sweeper.each(|node, instance| match ranges[node].clone() {
             range if range.is_empty() => Ok(()),
             range => instance.get_states(&mut x[range]),
@@ -95,22 +105,53 @@ impl Whole<'_> {
     }
 }
 
-struct Run<'a> {
-    ode: Whole<'a>,
-    solver: ExplicitSolver,
+/// A step of the integrator that does not count yet: nothing beyond its start was told to the FMUs for good.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct Ahead {
+    /// Its end [s]
     t: f64,
+    /// An event indicator has crossed zero there
+    crossed: bool,
+    /// The FMUs hold states inside the step
+    moved: bool,
+}
+
+/// A run between two steps of the integrator.
+pub(crate) struct Run {
+    ranges: Vec<Range<usize>>,
+    solver: ExplicitSolver,
+    /// How far the steps count [s]
+    pub(crate) t: f64,
     x: Vec<f64>,
     /// Next time event [s]
-    next_event: Option<f64>,
+    pub(crate) next_event: Option<f64>,
     /// Event indicators of each FMU
     indicators: Vec<Range<usize>>,
     z: Vec<f64>,
     z_new: Vec<f64>,
     inside: Vec<f64>,
+    /// State at the event that ends the step ahead
+    at_event: Vec<f64>,
     slope: Vec<f64>,
     before: Vec<f64>,
     grid: u64,
     events: u64,
+    ahead: Option<Ahead>,
+}
+
+/// What goes on in a run, for a saved state.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct RunState {
+    t: f64,
+    x: Vec<f64>,
+    next_event: Option<f64>,
+    z: Vec<f64>,
+    z_new: Vec<f64>,
+    at_event: Vec<f64>,
+    grid: u64,
+    events: u64,
+    ahead: Option<Ahead>,
+    solver: ExplicitState,
 }
 
 /// Consecutive ranges of given lengths.
@@ -124,10 +165,28 @@ fn ranges(lengths: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
         .collect()
 }
 
-impl<'a> Run<'a> {
-    fn start(sweeper: &'a mut Sweeper, config: &Config) -> Result<Self, Error> {
+impl Run {
+    /// Begins a run; the FMUs have been initialised.
+    pub(crate) fn start(sweeper: &mut Sweeper, config: &Config) -> Result<Self, Error> {
         let happened = events::update(sweeper)?;
         sweeper.each(|_, instance| instance.enter_continuous_time_mode())?;
+        let mut run = Self::of(sweeper, config)?;
+        run.next_event = happened.next;
+        Whole { sweeper, ranges: &run.ranges }.fetch(&mut run.x)?;
+        run.read_indicators(sweeper)?;
+        std::mem::swap(&mut run.z, &mut run.z_new);
+        Ok(run)
+    }
+
+    /// Goes on with a run that was saved; the FMUs are in the states that belong to it.
+    pub(crate) fn resume(sweeper: &mut Sweeper, config: &Config, state: &RunState) -> Result<Self, Error> {
+        let mut run = Self::of(sweeper, config)?;
+        run.restore(state);
+        Ok(run)
+    }
+
+    /// A run without states.
+    fn of(sweeper: &mut Sweeper, config: &Config) -> Result<Self, Error> {
         let state_ranges = ranges(sweeper.instances.iter().map(|i| i.fmu().description.states.len()));
         let n = state_ranges.last().map_or(0, |r| r.end);
         let mut counts = Vec::new();
@@ -142,46 +201,98 @@ impl<'a> Run<'a> {
             rtol: config.rtol,
             atol: config.atol,
         };
-        let solver = ExplicitSolver::new(settings, nominal).map_err(refused)?;
-        let before = sweeper.values.clone();
-        let mut run = Self {
-            ode: Whole { sweeper, ranges: state_ranges },
-            solver,
+        Ok(Self {
+            solver: ExplicitSolver::new(settings, nominal).map_err(refused)?,
+            before: sweeper.values.clone(),
+            ranges: state_ranges,
             t: config.start,
             x: vec![0.0; n],
-            next_event: happened.next,
+            next_event: None,
             indicators,
             z: vec![0.0; m],
             z_new: vec![0.0; m],
             inside: vec![0.0; n],
+            at_event: vec![0.0; n],
             slope: vec![0.0; n],
-            before,
             grid: 0,
             events: 0,
-        };
-        run.ode.fetch(&mut run.x)?;
-        run.read_indicators()?;
-        std::mem::swap(&mut run.z, &mut run.z_new);
-        Ok(run)
+            ahead: None,
+        })
+    }
+
+    /// What goes on.
+    pub(crate) fn save(&self) -> RunState {
+        let Self { t, x, next_event, z, z_new, at_event, grid, events, ahead, solver, .. } = self;
+        RunState {
+            x: x.clone(),
+            z: z.clone(),
+            z_new: z_new.clone(),
+            at_event: at_event.clone(),
+            solver: solver.save(),
+            t: *t,
+            next_event: *next_event,
+            grid: *grid,
+            events: *events,
+            ahead: *ahead,
+        }
+    }
+
+    /// Goes back to what went on.
+    pub(crate) fn restore(&mut self, state: &RunState) {
+        self.x.clone_from(&state.x);
+        self.z.clone_from(&state.z);
+        self.z_new.clone_from(&state.z_new);
+        self.at_event.clone_from(&state.at_event);
+        self.solver.restore(&state.solver);
+        (self.t, self.next_event) = (state.t, state.next_event);
+        (self.grid, self.events, self.ahead) = (state.grid, state.events, state.ahead);
+    }
+
+    /// Whether a saved state may be one of this run.
+    pub(crate) fn fits(&self, state: &RunState) -> bool {
+        let n = self.x.len();
+        state.x.len() == n
+            && state.z.len() == self.z.len()
+            && state.z_new.len() == self.z.len()
+            && state.at_event.len() == n
+            && self.solver.fits(&state.solver)
+    }
+
+    /// Counters of the integrator.
+    pub(crate) fn statistics(&self) -> Statistics {
+        self.solver.statistics
+    }
+
+    /// How far the equations are solved, whether the last step counts or not [s].
+    pub(crate) fn reached(&self) -> f64 {
+        self.ahead.map_or(self.t, |ahead| ahead.t)
+    }
+
+    /// A step is solved that does not count yet.
+    pub(crate) fn is_ahead(&self) -> bool {
+        self.ahead.is_some()
     }
 
     /// The event indicators at the present time into `z_new`.
-    fn read_indicators(&mut self) -> Result<(), RunError> {
+    fn read_indicators(&mut self, sweeper: &mut Sweeper) -> Result<(), RunError> {
         let (ranges, z) = (&self.indicators, &mut self.z_new);
-        self.ode.sweeper.each(|node, instance| match ranges[node].clone() {
+        sweeper.each(|node, instance| match ranges[node].clone() {
             range if range.is_empty() => Ok(()),
             range => instance.get_indicators(&mut z[range]),
         })
     }
 
-    /// The furthest time of the next step: grid of fixed steps, time event, stop.
-    fn target(&mut self, config: &Config) -> f64 {
-        let mut target = config.stop;
+    /// The furthest time of the next step: grid of fixed steps, time event, `limit`.
+    fn target(&mut self, config: &Config, limit: f64) -> f64 {
+        let mut target = limit;
         if let (false, Some(step)) = (self.solver.is_adaptive(), config.step) {
             while config.point(self.grid, step) <= self.t + 1e-9 * step && self.t < config.stop {
                 self.grid += 1;
             }
-            target = target.min(config.point(self.grid, step));
+            let point = config.point(self.grid, step);
+            if point <= limit - 1e-9 * step {
+                target = point;
+            }
         }
         match self.next_event {
             Some(event) if event > self.t => target.min(event),
@@ -189,41 +300,52 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn step(&mut self, config: &Config, recorder: &mut Recorder) -> Result<(), Error> {
-        let target = self.target(config);
-        let mut t = self.solver.step(&mut self.ode, self.t, &self.x, target).map_err(integrator)?;
+    /// Solves the next step, not beyond `limit`; it does not count yet.
+    pub(crate) fn advance(&mut self, sweeper: &mut Sweeper, config: &Config, limit: f64) -> Result<(), Error> {
+        let target = self.target(config, limit);
+        let mut ode = Whole { sweeper, ranges: &self.ranges };
+        let mut t = self.solver.step(&mut ode, self.t, &self.x, target).map_err(integrator)?;
         let mut crossed = false;
-        let mut moved = false;
         if !self.z.is_empty() {
-            self.solver.slope(&mut self.ode).map_err(integrator)?;
-            self.read_indicators()?;
+            self.solver.slope(&mut ode).map_err(integrator)?;
+            self.read_indicators(sweeper)?;
             if self.has_crossed() {
-                t = self.locate(t)?;
+                t = self.locate(sweeper, t)?;
                 crossed = true;
             }
         }
-        while let Some(sample) = recorder.due_before(config, t) {
-            let theta = (sample - self.t) / self.solver.interval().1;
-            self.solver.inside(&mut self.ode, theta, &mut self.inside).map_err(integrator)?;
-            self.ode.place(sample, &self.inside)?;
-            self.ode.sweeper.sweep()?;
-            recorder.record(self.ode.sweeper, sample)?;
-            moved = true;
+        self.ahead = Some(Ahead { t, crossed, moved: crossed });
+        Ok(())
+    }
+
+    /// Brings the FMUs to the time `t` inside the step that was solved last.
+    pub(crate) fn look(&mut self, sweeper: &mut Sweeper, t: f64) -> Result<(), Error> {
+        let mut ode = Whole { sweeper, ranges: &self.ranges };
+        let theta = (t - self.t) / self.solver.interval().1;
+        self.solver.inside(&mut ode, theta, &mut self.inside).map_err(integrator)?;
+        ode.place(t, &self.inside)?;
+        sweeper.sweep()?;
+        if let Some(ahead) = &mut self.ahead {
+            ahead.moved = true;
         }
+        Ok(())
+    }
+
+    /// The step solved last counts: the FMUs are brought to its end and hear of it, events are carried out.
+    pub(crate) fn accept(&mut self, sweeper: &mut Sweeper) -> Result<(), Error> {
+        let Some(Ahead { t, crossed, moved }) = self.ahead.take() else { return Ok(()) };
+        let mut ode = Whole { sweeper, ranges: &self.ranges };
         if crossed {
-            // `inside` may have been used for samples: the state at the event stands in x
-            self.ode.rhs(t, &self.x, &mut self.slope)?;
+            self.x.copy_from_slice(&self.at_event);
         } else {
             self.x.copy_from_slice(self.solver.state());
-            self.solver.slope(&mut self.ode).map_err(integrator)?;
-            if moved {
-                self.ode.rhs(t, &self.x, &mut self.slope)?;
-            }
+            self.solver.slope(&mut ode).map_err(integrator)?;
+        }
+        if moved {
+            ode.rhs(t, &self.x, &mut self.slope)?;
         }
         self.t = t;
-        self.complete(crossed)?;
-        recorder.offer(self.ode.sweeper, config, t)?;
-        Ok(())
+        self.complete(sweeper, crossed)
     }
 
     fn has_crossed(&self) -> bool {
@@ -231,51 +353,57 @@ impl<'a> Run<'a> {
     }
 
     /// The first crossing inside the last step by bisection, each time with a step of the method; leaves the state just
-    /// behind it in `x` and the indicators in `z_new`.
-    fn locate(&mut self, t_end: f64) -> Result<f64, Error> {
+    /// behind it in `at_event` and the indicators in `z_new`.
+    fn locate(&mut self, sweeper: &mut Sweeper, t_end: f64) -> Result<f64, Error> {
         let (start, h) = self.solver.interval();
         let (mut lo, mut hi) = (0.0, 1.0);
         let width = EVENT_WIDTH.max(4.0 * f64::EPSILON * start.abs().max(t_end.abs()) / h);
         while hi - lo > width {
             let theta = 0.5 * (lo + hi);
-            self.solver.repeat(&mut self.ode, theta, &mut self.inside).map_err(integrator)?;
-            self.ode.rhs(start + theta * h, &self.inside, &mut self.slope)?;
-            self.read_indicators()?;
+            let mut ode = Whole { sweeper, ranges: &self.ranges };
+            self.solver.repeat(&mut ode, theta, &mut self.inside).map_err(integrator)?;
+            ode.rhs(start + theta * h, &self.inside, &mut self.slope)?;
+            self.read_indicators(sweeper)?;
             if self.has_crossed() { hi = theta } else { lo = theta }
         }
-        self.solver.repeat(&mut self.ode, hi, &mut self.inside).map_err(integrator)?;
-        self.x.copy_from_slice(&self.inside);
+        let mut ode = Whole { sweeper, ranges: &self.ranges };
+        self.solver.repeat(&mut ode, hi, &mut self.at_event).map_err(integrator)?;
         Ok(if hi >= 1.0 { t_end } else { start + hi * h })
     }
 
-    /// The step counts: FMUs hear of it, events are carried out.
-    fn complete(&mut self, crossed: bool) -> Result<(), Error> {
+    /// FMUs hear of the end of a step, events are carried out.
+    fn complete(&mut self, sweeper: &mut Sweeper, crossed: bool) -> Result<(), Error> {
         let mut event = crossed || self.next_event.is_some_and(|event| event <= self.t);
-        for node in 0..self.ode.sweeper.instances.len() {
-            let instance = &mut self.ode.sweeper.instances[node];
+        for node in 0..sweeper.instances.len() {
+            let instance = &mut sweeper.instances[node];
             if instance.capabilities().completed_steps {
                 let (wanted, terminate) =
-                    instance.completed_step().map_err(|fault| self.ode.sweeper.failed(node, fault))?;
+                    instance.completed_step().map_err(|fault| sweeper.failed(node, fault))?;
                 if terminate {
                     let fault = Fault { function: "CompletedIntegratorStep", status: Status::Terminate };
-                    return Err(self.ode.sweeper.failed(node, fault).into());
+                    return Err(sweeper.failed(node, fault).into());
                 }
                 event |= wanted;
             }
         }
         if event {
-            self.event()?;
+            self.events += 1;
+            self.event(sweeper, |_| Ok(()))?;
         } else {
             std::mem::swap(&mut self.z, &mut self.z_new);
         }
         Ok(())
     }
 
-    fn event(&mut self) -> Result<(), Error> {
-        self.events += 1;
-        let sweeper = &mut *self.ode.sweeper;
+    /// Event Mode of all FMUs, in which `change` may set what changes at events only.
+    pub(crate) fn event(
+        &mut self,
+        sweeper: &mut Sweeper,
+        change: impl FnOnce(&mut Sweeper) -> Result<(), RunError>,
+    ) -> Result<(), Error> {
         self.before.copy_from_slice(&sweeper.values);
         sweeper.each(|_, instance| instance.enter_event_mode())?;
+        change(sweeper)?;
         let happened = events::update(sweeper)?;
         // states may have jumped: all signals once more
         sweeper.sweep()?;
@@ -283,16 +411,37 @@ impl<'a> Run<'a> {
         self.next_event = happened.next;
         let jumped = self.before.iter().zip(&sweeper.values).any(|(a, b)| a.to_bits() != b.to_bits());
         if happened.states_changed {
-            self.ode.fetch(&mut self.x)?;
+            Whole { sweeper, ranges: &self.ranges }.fetch(&mut self.x)?;
         }
         if happened.states_changed || jumped {
             self.solver.restart();
         } else {
             self.solver.changed();
         }
-        self.read_indicators()?;
+        self.read_indicators(sweeper)?;
         std::mem::swap(&mut self.z, &mut self.z_new);
         Ok(())
+    }
+
+    /// Inputs change at `t`: a step that does not count ends there, the FMUs stand there with the inputs of the sweeper.
+    pub(crate) fn turn(&mut self, sweeper: &mut Sweeper, t: f64) -> Result<(), Error> {
+        let mut ode = Whole { sweeper, ranges: &self.ranges };
+        if self.ahead.take().is_some() {
+            let theta = (t - self.t) / self.solver.interval().1;
+            self.solver.inside(&mut ode, theta, &mut self.inside).map_err(integrator)?;
+            self.x.copy_from_slice(&self.inside);
+            self.t = t;
+        }
+        self.solver.changed();
+        ode.rhs(self.t, &self.x, &mut self.slope)?;
+        self.read_indicators(sweeper)?;
+        std::mem::swap(&mut self.z, &mut self.z_new);
+        Ok(())
+    }
+
+    /// Brings the FMUs back to the last state that counts, after a call that failed.
+    pub(crate) fn place(&mut self, sweeper: &mut Sweeper) -> Result<(), Error> {
+        Ok(Whole { sweeper, ranges: &self.ranges }.rhs(self.t, &self.x, &mut self.slope)?)
     }
 }
 

@@ -128,7 +128,8 @@ impl Package {
                 }
             }
         }
-        if outside.is_file() {
+        // a folder is an unpacked FMU
+        if outside.exists() {
             return Ok(outside);
         }
         Err(SspError::NoFmu { source_name: source.into(), scene: self.path.clone(), folder: fallback.into() })
