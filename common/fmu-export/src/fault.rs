@@ -236,6 +236,14 @@ pub enum Fault {
         /// Largest usable inner step
         largest: f64,
     },
+    /// What a part of an assembly says, with its name in the text.
+    #[error("{message}")]
+    Part {
+        /// The text
+        message: String,
+        /// What it means for the call
+        status: Status,
+    },
     /// A panic, caught.
     #[error("internal error, the instance is lost: {message}")]
     Panic {
@@ -265,6 +273,7 @@ impl Fault {
             | Self::Evaluation { .. }
             | Self::OffManifold { .. }
             | Self::NotFinite { .. } => Status::Discard,
+            Self::Part { status, .. } => *status,
             Self::Panic { .. } => Status::Fatal,
             _ => Status::Error,
         }

@@ -12,10 +12,7 @@ use crate::jobs::{Begin, Evaluate, EventIndicators, Rates, Start};
 use crate::phase::{Interface, Phase, Rule};
 use crate::state::State;
 use crate::table::{ALL_PARTS, Layout, Part, Table, Variable};
-use crate::{Fault, SolverParameters};
-
-/// A host may miss the instance's time by this much (relative to max(1, |t|)).
-pub(crate) const SAME_TIME: f64 = 1e-9;
+use crate::{Fault, SolverParameters, times};
 
 /// An instance.
 #[derive(Debug)]
@@ -85,14 +82,7 @@ impl<M: Model> Instance<M> {
     /// [`Fault::WrongPhase`].
     #[inline]
     pub fn enter(&self, rule: &Rule) -> Result<(), Fault> {
-        let State { interface, phase, .. } = self.state;
-        if rule.allows(interface, phase) {
-            return Ok(());
-        }
-        Err(Fault::WrongPhase {
-            phase: format!("{phase:?} of {interface}"),
-            allowed: rule.allowed(interface),
-        })
+        rule.check(self.state.interface, self.state.phase)
     }
 
     /// The instance is lost.
@@ -102,10 +92,7 @@ impl<M: Model> Instance<M> {
 
     /// A variable by its value reference.
     pub(crate) fn variable(&self, reference: u32) -> Result<&Variable, Fault> {
-        self.table
-            .variables
-            .get(reference as usize)
-            .ok_or(Fault::UnknownReference { reference, count: self.table.variables.len() })
+        self.table.variable(reference)
     }
 
     /// Name of a type in the standard that the instance speaks.
@@ -119,18 +106,7 @@ impl<M: Model> Instance<M> {
     /// # Errors
     /// Times that make no sense.
     pub fn setup_experiment(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
-        if !start.is_finite() {
-            return Err(Fault::Argument { argument: "startTime", value: start, allowed: "finite".into() });
-        }
-        if let Some(stop) = stop
-            && !(stop.is_finite() && stop > start)
-        {
-            return Err(Fault::Argument {
-                argument: "stopTime",
-                value: stop,
-                allowed: format!("> {start} s, finite"),
-            });
-        }
+        times::experiment(start, stop)?;
         self.state.start_time = start;
         self.state.stop_time = stop;
         Ok(())

@@ -8,7 +8,8 @@ mod instance;
 pub use archive::{Archive, ArchiveError};
 pub use binding::{Fault, LibraryError, Status, Stepped, Update};
 pub use description::{
-    Capabilities, Causality, Description, DescriptionError, Experiment, Initial, Variable, VariableKind, Version,
+    Capabilities, Causality, Description, DescriptionError, Experiment, Initial, Variable, VariableKind,
+    Version,
 };
 pub use instance::{Counts, Instance, Interface, Saved};
 
@@ -219,8 +220,7 @@ impl Fmu {
             Folder::Given(self.path.clone())
         } else {
             let mut archive = Archive::open(&self.path)?;
-            let folder =
-                tempfile::Builder::new().prefix("koppel-").tempdir().map_err(ImportError::Folder)?;
+            let folder = tempfile::Builder::new().prefix("koppel-").tempdir().map_err(ImportError::Folder)?;
             archive.unpack(folder.path(), |name| {
                 name.starts_with(&binaries) || name.starts_with("resources/")
             })?;

@@ -2,9 +2,7 @@
 
 use std::ops::Range;
 
-use integrators::{
-    DynamicOde, ExplicitSolver, ExplicitState, NotExplicit, Settings, Statistics, StepError,
-};
+use integrators::{DynamicOde, ExplicitSolver, ExplicitState, NotExplicit, Settings, Statistics, StepError};
 use serde::{Deserialize, Serialize};
 
 use super::{Clock, Config, Progress, Steps, events};
@@ -301,7 +299,12 @@ impl Run {
     }
 
     /// Solves the next step, not beyond `limit`; it does not count yet.
-    pub(crate) fn advance(&mut self, sweeper: &mut Sweeper, config: &Config, limit: f64) -> Result<(), Error> {
+    pub(crate) fn advance(
+        &mut self,
+        sweeper: &mut Sweeper,
+        config: &Config,
+        limit: f64,
+    ) -> Result<(), Error> {
         let target = self.target(config, limit);
         let mut ode = Whole { sweeper, ranges: &self.ranges };
         let mut t = self.solver.step(&mut ode, self.t, &self.x, target).map_err(integrator)?;
