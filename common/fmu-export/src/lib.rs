@@ -53,5 +53,5 @@ pub use serialise::SerialisedStateError;
 pub use solver::{SolverCounters, SolverMethod, SolverParameters};
 pub use standard::Standard;
 pub use state::State;
-pub use table::{Table, Variable, allowed};
+pub use table::{TIME, Table, Variable, allowed};
 pub use terminals::parts as port_parts;

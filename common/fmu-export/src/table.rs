@@ -114,7 +114,7 @@ impl Part {
 pub(crate) const ALL_PARTS: u8 = 0x3f;
 
 /// The independent variable.
-pub(crate) const TIME: Entry = {
+pub const TIME: Entry = {
     let mut time = Entry::scalar("time", Kind::Float64);
     time.description = "Simulation time";
     time.unit = "s";

@@ -115,11 +115,10 @@ fn enumerations(table: &Table) -> Vec<&'static EnumType> {
 /// Items of an enumeration with the numbers they have in the code.
 fn items(xml: &mut Xml, t: &EnumType) -> io::Result<()> {
     t.items.iter().try_for_each(|item| {
-        let attributes = [
-            ("name", item.name.to_string()),
-            ("value", item.value.to_string()),
-            ("description", item.description.into()),
-        ];
+        let mut attributes = vec![("name", item.name.to_string()), ("value", item.value.to_string())];
+        if !item.description.is_empty() {
+            attributes.push(("description", item.description.into()));
+        }
         leaf(xml, "Item", &attributes)
     })
 }

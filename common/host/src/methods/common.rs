@@ -146,6 +146,7 @@ pub(crate) struct RunState {
     z: Vec<f64>,
     z_new: Vec<f64>,
     at_event: Vec<f64>,
+    before: Vec<f64>,
     grid: u64,
     events: u64,
     ahead: Option<Ahead>,
@@ -177,10 +178,19 @@ impl Run {
     }
 
     /// Goes on with a run that was saved; the FMUs are in the states that belong to it.
-    pub(crate) fn resume(sweeper: &mut Sweeper, config: &Config, state: &RunState) -> Result<Self, Error> {
+    ///
+    /// None if the state has other sizes.
+    pub(crate) fn resume(
+        sweeper: &mut Sweeper,
+        config: &Config,
+        state: &RunState,
+    ) -> Result<Option<Self>, Error> {
         let mut run = Self::of(sweeper, config)?;
+        if !run.fits(state) {
+            return Ok(None);
+        }
         run.restore(state);
-        Ok(run)
+        Ok(Some(run))
     }
 
     /// A run without states.
@@ -220,12 +230,13 @@ impl Run {
 
     /// What goes on.
     pub(crate) fn save(&self) -> RunState {
-        let Self { t, x, next_event, z, z_new, at_event, grid, events, ahead, solver, .. } = self;
+        let Self { t, x, next_event, z, z_new, at_event, before, grid, events, ahead, solver, .. } = self;
         RunState {
             x: x.clone(),
             z: z.clone(),
             z_new: z_new.clone(),
             at_event: at_event.clone(),
+            before: before.clone(),
             solver: solver.save(),
             t: *t,
             next_event: *next_event,
@@ -241,18 +252,20 @@ impl Run {
         self.z.clone_from(&state.z);
         self.z_new.clone_from(&state.z_new);
         self.at_event.clone_from(&state.at_event);
+        self.before.clone_from(&state.before);
         self.solver.restore(&state.solver);
         (self.t, self.next_event) = (state.t, state.next_event);
         (self.grid, self.events, self.ahead) = (state.grid, state.events, state.ahead);
     }
 
     /// Whether a saved state may be one of this run.
-    pub(crate) fn fits(&self, state: &RunState) -> bool {
+    fn fits(&self, state: &RunState) -> bool {
         let n = self.x.len();
         state.x.len() == n
             && state.z.len() == self.z.len()
             && state.z_new.len() == self.z.len()
             && state.at_event.len() == n
+            && state.before.len() == self.before.len()
             && self.solver.fits(&state.solver)
     }
 
@@ -391,22 +404,22 @@ impl Run {
         }
         if event {
             self.events += 1;
-            self.event(sweeper, |_| Ok(()))?;
+            self.enter_event_mode(sweeper)?;
+            self.leave_event_mode(sweeper)?;
         } else {
             std::mem::swap(&mut self.z, &mut self.z_new);
         }
         Ok(())
     }
 
-    /// Event Mode of all FMUs, in which `change` may set what changes at events only.
-    pub(crate) fn event(
-        &mut self,
-        sweeper: &mut Sweeper,
-        change: impl FnOnce(&mut Sweeper) -> Result<(), RunError>,
-    ) -> Result<(), Error> {
+    /// Into Event Mode of all FMUs, where what changes at events only may be set.
+    pub(crate) fn enter_event_mode(&mut self, sweeper: &mut Sweeper) -> Result<(), Error> {
         self.before.copy_from_slice(&sweeper.values);
-        sweeper.each(|_, instance| instance.enter_event_mode())?;
-        change(sweeper)?;
+        Ok(sweeper.each(|_, instance| instance.enter_event_mode())?)
+    }
+
+    /// Carries out the event and goes on with Continuous-Time Mode.
+    pub(crate) fn leave_event_mode(&mut self, sweeper: &mut Sweeper) -> Result<(), Error> {
         let happened = events::update(sweeper)?;
         // states may have jumped: all signals once more
         sweeper.sweep()?;
@@ -440,11 +453,6 @@ impl Run {
         self.read_indicators(sweeper)?;
         std::mem::swap(&mut self.z, &mut self.z_new);
         Ok(())
-    }
-
-    /// Brings the FMUs back to the last state that counts, after a call that failed.
-    pub(crate) fn place(&mut self, sweeper: &mut Sweeper) -> Result<(), Error> {
-        Ok(Whole { sweeper, ranges: &self.ranges }.rhs(self.t, &self.x, &mut self.slope)?)
     }
 }
 

@@ -63,6 +63,14 @@ impl Package {
         self.structure = structure.into();
     }
 
+    /// The root structure as it is written.
+    ///
+    /// # Errors
+    /// A missing structure.
+    pub fn structure(&self) -> Result<Vec<u8>, SspError> {
+        self.read(&self.structure)
+    }
+
     /// Reads the system structure.
     ///
     /// # Errors

@@ -61,6 +61,17 @@ impl Driven {
     }
 }
 
+impl Driven {
+    /// Component and value reference of an input.
+    pub(crate) fn target(&self, input: usize) -> (usize, u32) {
+        let of = |target: &Target| {
+            let at = target.places.iter().position(|&place| place == input)?;
+            Some((target.node, target.references[at]))
+        };
+        self.targets.iter().find_map(of).unwrap_or_default()
+    }
+}
+
 impl Sweeper {
     /// Brings the inputs from outside to the time `t`.
     ///
