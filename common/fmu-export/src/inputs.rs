@@ -61,6 +61,9 @@ impl PortParameters {
         Self { inputs: InputTreatment::Hold, order: 0, integrate_motion: false, limit: 0.0 };
 
     /// The parameters themselves, if they fit together.
+    ///
+    /// # Errors
+    /// An order that the treatment does not have.
     pub fn checked(self) -> Result<Self, ParameterError> {
         let (low, high, name) = match self.inputs {
             InputTreatment::Hold => return Ok(self),
@@ -141,11 +144,13 @@ impl Channels {
     }
 
     /// Number of inputs.
+    #[must_use]
     pub fn count(&self) -> usize {
         self.count
     }
 
     /// True if positions and velocities may move by themselves.
+    #[must_use]
     pub fn moving(&self) -> bool {
         !self.motions.is_empty()
     }

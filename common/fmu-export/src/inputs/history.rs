@@ -19,11 +19,13 @@ pub struct History {
 
 impl History {
     /// No samples of `count` inputs.
+    #[must_use]
     pub fn new(count: usize) -> Self {
         Self { t: [0.0; SAMPLES], u: vec![0.0; SAMPLES * count], len: 0, same: 0 }
     }
 
     /// True if it may be a history of `count` inputs.
+    #[must_use]
     pub fn fits(&self, count: usize) -> bool {
         self.u.len() == SAMPLES * count && self.len <= SAMPLES && self.same <= self.len
     }
@@ -40,6 +42,7 @@ impl History {
     }
 
     /// True if all samples are the inputs as set, so that no polynomial moves.
+    #[must_use]
     pub fn settled(&self) -> bool {
         self.same == SAMPLES
     }

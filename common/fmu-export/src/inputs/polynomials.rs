@@ -31,6 +31,7 @@ pub struct Polynomials {
 
 impl Polynomials {
     /// Room for `channels`.
+    #[must_use]
     pub fn new(channels: &Channels) -> Self {
         Self {
             from: 0.0,
@@ -41,6 +42,7 @@ impl Polynomials {
     }
 
     /// True if every input keeps its value.
+    #[must_use]
     pub fn constant(&self) -> bool {
         self.newton.is_empty() && self.powers.is_empty()
     }

@@ -116,7 +116,7 @@ impl Assembly {
         self.given = self.values[self.layout.inputs.clone()].to_vec();
         self.inputs.clone_from(&self.given);
         self.history = History::new(self.given.len());
-        self.sweeper.driven = Driven::new(&self.layout.targets(&self.scene), self.given.clone());
+        self.sweeper.driven = Driven::new(&Layout::targets(&self.scene), self.given.clone());
         self.run = None;
         self.phase = Phase::Instantiated;
         (self.start_time, self.stop_time, self.reset_seen) = (0.0, None, 0.0);

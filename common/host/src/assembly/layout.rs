@@ -135,7 +135,7 @@ impl Layout {
     }
 
     /// Components and value references of the continuous inputs from outside.
-    pub(super) fn targets(&self, scene: &Scene) -> Vec<(usize, u32)> {
+    pub(super) fn targets(scene: &Scene) -> Vec<(usize, u32)> {
         let outer = Outer::of(scene);
         let discrete = |&(node, reference): &(usize, u32)| {
             let variables = &scene.network.nodes[node].fmu.description.variables;
@@ -315,7 +315,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Names that occur once, and are names in FMI's structured naming.
+    /// No name occurs twice.
     fn check(&self) -> Result<(), AssemblyError> {
         let mut names = BTreeSet::new();
         match self.variables.iter().find(|v| !names.insert(&v.name)) {

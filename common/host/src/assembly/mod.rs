@@ -34,10 +34,10 @@ use crate::ssp::SspError;
 pub enum AssemblyError {
     /// The scene
     #[error(transparent)]
-    Scene(#[from] SceneError),
+    Scene(Box<SceneError>),
     /// Its elements
     #[error(transparent)]
-    Run(#[from] RunError),
+    Run(Box<RunError>),
     /// Two variables of one name
     #[error("two variables of the assembly would be named {0}: rename an element")]
     Twice(String),
@@ -51,7 +51,7 @@ pub enum AssemblyError {
     SameFile(String, String),
     /// The archive
     #[error(transparent)]
-    Pack(#[from] fmu_export::PackError),
+    Pack(Box<fmu_export::PackError>),
     /// A file
     #[error("{path}: {source}")]
     Io {
@@ -62,23 +62,41 @@ pub enum AssemblyError {
     },
 }
 
+impl From<SceneError> for AssemblyError {
+    fn from(error: SceneError) -> Self {
+        Self::Scene(Box::new(error))
+    }
+}
+
+impl From<RunError> for AssemblyError {
+    fn from(error: RunError) -> Self {
+        Self::Run(Box::new(error))
+    }
+}
+
+impl From<fmu_export::PackError> for AssemblyError {
+    fn from(error: fmu_export::PackError) -> Self {
+        Self::Pack(Box::new(error))
+    }
+}
+
 impl From<SspError> for AssemblyError {
     fn from(error: SspError) -> Self {
-        Self::Scene(error.into())
+        SceneError::from(error).into()
     }
 }
 
 impl From<ImportError> for AssemblyError {
     fn from(error: ImportError) -> Self {
-        Self::Scene(error.into())
+        SceneError::from(error).into()
     }
 }
 
 impl From<Error> for AssemblyError {
     fn from(error: Error) -> Self {
         match error {
-            Error::Scene(error) => Self::Scene(*error),
-            Error::Run(error) => Self::Run(error),
+            Error::Scene(error) => Self::Scene(error),
+            Error::Run(error) => error.into(),
             Error::Output { path, source } => Self::Io { path: path.into(), source },
         }
     }

@@ -181,7 +181,7 @@ fn reference(loaded: &Loaded) -> Result<String, AssemblyError> {
     let mut recorder = Recorder::new(&scene.network, &outputs, interval);
     scene.run(&config, &[], &mut recorder, &mut |_| ())?;
     let mut text = String::from("time");
-    outputs.iter().for_each(|o| text.extend([",", &o.name]));
+    text.extend(outputs.iter().flat_map(|o| [",", o.name.as_str()]));
     text.push('\n');
     for (t, row) in recorder.times.iter().zip(&recorder.rows) {
         let _ = write!(text, "{t}"); // a string takes everything

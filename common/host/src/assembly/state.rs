@@ -66,9 +66,8 @@ impl Assembly {
         backup.elements.resize_with(sweeper.instances.len(), || None);
         let elements = &mut backup.elements;
         sweeper
-            .each(|node, instance| match instance.capabilities().state_saving {
-                true => instance.save(&mut elements[node]),
-                false => Ok(()),
+            .each(|node, instance| {
+                if instance.capabilities().state_saving { instance.save(&mut elements[node]) } else { Ok(()) }
             })
             .map_err(refused)
     }

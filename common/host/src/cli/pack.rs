@@ -29,8 +29,8 @@ fn assembly(options: &Pack) -> Result<Answer, CommandError> {
         output: &options.output,
     };
     let packed = assembly::pack(&packing).map_err(|error| match error {
-        AssemblyError::Scene(error) => error.into(),
-        AssemblyError::Run(error) => crate::error::Error::Run(error).into(),
+        AssemblyError::Scene(error) => (*error).into(),
+        AssemblyError::Run(error) => crate::error::Error::Run(*error).into(),
         other => CommandError::Assembly(Box::new(other)),
     })?;
     let text = format!(
