@@ -77,6 +77,7 @@ pub(crate) struct Description {
     pub(crate) token: String,
     pub(crate) model_exchange: bool,
     pub(crate) serialises: bool,
+    pub(crate) derives: bool,
     pub(crate) stop: f64,
     pub(crate) step: f64,
     pub(crate) variables: Vec<Variable>,
@@ -145,6 +146,9 @@ impl Description {
                     found.identifier = text(&a, "modelIdentifier");
                     let serialises = a.get("canSerializeFMUState").or(a.get("canSerializeFMUstate"));
                     found.serialises = serialises.is_some_and(|v| v == "true");
+                    let derives =
+                        a.get("providesDirectionalDerivatives").or(a.get("providesDirectionalDerivative"));
+                    found.derives = derives.is_some_and(|v| v == "true");
                 }
                 "ModelExchange" => found.model_exchange = true,
                 "EnumerationType" | "SimpleType" => open_type = text(&a, "name"),

@@ -31,7 +31,7 @@ pub struct Assembly {
     pub(super) phase: Phase,
     pub(super) start_time: f64,
     pub(super) stop_time: Option<f64>,
-    /// Values that no element holds, by value reference
+    /// Values that no element holds, and those that were set, by value reference
     pub(super) values: Vec<f64>,
     pub(super) channels: Channels,
     pub(super) polynomials: Polynomials,
@@ -45,6 +45,10 @@ pub struct Assembly {
     pub(super) stale: bool,
     /// The elements are in Event Mode, where something was set that changes at events only
     pub(super) in_event: bool,
+    /// Something was taken over since the last step
+    pub(super) changed: bool,
+    /// What was set is taken over
+    pub(super) settled: bool,
     /// The elements stand at the present time
     pub(super) shown: bool,
     pub(super) backup: Backup,
@@ -103,6 +107,8 @@ impl Assembly {
             reset_seen: 0.0,
             stale: true,
             in_event: false,
+            changed: false,
+            settled: true,
             shown: true,
             warnings: Vec::new(),
         };
@@ -121,6 +127,7 @@ impl Assembly {
         self.phase = Phase::Instantiated;
         (self.start_time, self.stop_time, self.reset_seen) = (0.0, None, 0.0);
         (self.stale, self.in_event, self.shown) = (true, false, true);
+        (self.changed, self.settled) = (false, true);
         self.warnings.clear();
     }
 

@@ -260,15 +260,15 @@ impl Builder<'_> {
             VariableKind::Enumeration => {
                 let name = v.declared_type.as_deref()?;
                 let description = &self.scene.network.nodes[node].fmu.description;
-                let items: Vec<_> = description.enumerations.get(name)?.clone();
-                let items: Vec<_> =
-                    items.into_iter().map(|(item, value)| (item, value, String::new())).collect();
-                let found = interned::enumeration(name, "", &items);
+                let import::Enumeration { text, items } = description.enumerations.get(name)?;
+                let item = |item: &import::Item| (item.name.clone(), item.value, item.text.clone());
+                let items: Vec<_> = items.iter().map(item).collect();
+                let found = interned::enumeration(name, text, &items);
                 let known = *self.types.entry(name.into()).or_insert(found);
                 // two FMUs may mean different things by one name
-                let same = known.items == found.items;
                 let longer = format!("{}.{name}", description.name);
-                Kind::Enumeration(if same { known } else { interned::enumeration(&longer, "", &items) })
+                let same = known.items == found.items;
+                Kind::Enumeration(if same { known } else { interned::enumeration(&longer, text, &items) })
             }
             VariableKind::String | VariableKind::Other => return None,
         })

@@ -23,6 +23,8 @@ pub struct AssemblyState {
     reset_seen: f64,
     stale: bool,
     in_event: bool,
+    changed: bool,
+    settled: bool,
     shown: bool,
     sweep: SweepState,
     run: Option<RunState>,
@@ -36,8 +38,7 @@ pub(super) struct Backup {
     elements: Vec<Option<Saved>>,
     run: Option<RunState>,
     sweep: Option<SweepState>,
-    in_event: bool,
-    shown: bool,
+    flags: [bool; 4],
 }
 
 impl Backup {
@@ -52,6 +53,11 @@ impl Backup {
 }
 
 impl Assembly {
+    /// Whether all elements can turn their states into bytes.
+    fn serialises(&self) -> bool {
+        self.sweeper.instances.iter().all(|instance| instance.capabilities().serialised_states)
+    }
+
     /// Whether all elements can save their states.
     fn saves(&self) -> bool {
         self.sweeper.instances.iter().all(|instance| instance.capabilities().state_saving)
@@ -59,8 +65,8 @@ impl Assembly {
 
     /// Remembers where a step begins.
     pub(super) fn keep(&mut self) -> Result<(), Fault> {
-        let Self { backup, sweeper, run, in_event, shown, .. } = self;
-        (backup.in_event, backup.shown) = (*in_event, *shown);
+        let Self { backup, sweeper, run, in_event, changed, settled, shown, .. } = self;
+        backup.flags = [*in_event, *changed, *settled, *shown];
         backup.sweep = Some(sweeper.save());
         backup.run = run.as_ref().map(Run::save);
         backup.elements.resize_with(sweeper.instances.len(), || None);
@@ -75,7 +81,7 @@ impl Assembly {
     /// Back to where the step began.
     pub(super) fn go_back(&mut self) {
         let Self { backup, sweeper, run, .. } = self;
-        (self.in_event, self.shown) = (backup.in_event, backup.shown);
+        [self.in_event, self.changed, self.settled, self.shown] = backup.flags;
         let elements = &backup.elements;
         let restored = sweeper.each(|node, instance| match &elements[node] {
             Some(saved) => instance.restore(saved),
@@ -95,6 +101,9 @@ impl Assembly {
 
     /// The present state.
     pub(super) fn saved(&mut self) -> Result<AssemblyState, Fault> {
+        if !self.serialises() {
+            return Err(Fault::Unsupported { reason: "an element cannot serialise its state" });
+        }
         let mut elements = Vec::new();
         let saved = self.sweeper.each(|_, instance| instance.save_bytes().map(|bytes| elements.push(bytes)));
         saved.map_err(refused)?;
@@ -110,6 +119,8 @@ impl Assembly {
             reset_seen: self.reset_seen,
             stale: self.stale,
             in_event: self.in_event,
+            changed: self.changed,
+            settled: self.settled,
             shown: self.shown,
             sweep: self.sweeper.save(),
             run: self.run.as_ref().map(Run::save),
@@ -132,6 +143,7 @@ impl Assembly {
         self.history.clone_from(&saved.history);
         self.reset_seen = saved.reset_seen;
         (self.stale, self.in_event, self.shown) = (saved.stale, saved.in_event, saved.shown);
+        (self.changed, self.settled) = (saved.changed, saved.settled);
         self.config = self.configured()?;
         self.run = match &saved.run {
             None => None,

@@ -2,7 +2,6 @@
 
 use fmu_export::inputs::Span;
 use fmu_export::{Fault, InputTreatment};
-use integrators::MAX_EVALUATIONS;
 use model::Variables;
 
 use super::{Assembly, refused};
@@ -11,6 +10,9 @@ use crate::methods::Run;
 
 /// Times that differ by less than this part of a fixed step are one.
 const SAME_TIME: f64 = 1e-9;
+
+/// Most evaluations of the scene in one step: a tenth of those of an FMU, since one costs more than ten times as much.
+const MAX_EVALUATIONS: u64 = integrators::MAX_EVALUATIONS / 10;
 
 /// True if the bits are the same.
 fn identical(a: &[f64], b: &[f64]) -> bool {
@@ -30,27 +32,28 @@ impl Assembly {
         Ok(())
     }
 
-    /// Takes over what was set since the last step: the elements stand at the present time with these inputs. True if
-    /// something has changed.
-    pub(super) fn settle(&mut self, inputs: &[f64]) -> Result<bool, Fault> {
+    /// Takes over what was set: the elements stand at the present time with these inputs. After a fault the next call
+    /// tries again.
+    pub(super) fn settle(&mut self, inputs: &[f64]) -> Result<(), Fault> {
         let t = self.values[0];
         let changed = !identical(inputs, &self.sweeper.driven.values);
-        let Some(run) = self.run.as_mut() else { return Ok(false) };
-        let was_in_event = self.in_event;
-        if changed {
-            self.sweeper.driven.values.copy_from_slice(inputs);
-            self.sweeper.driven.course = None;
-            self.sweeper.drive_all().map_err(refused)?;
-            if !was_in_event {
-                run.turn(&mut self.sweeper, t).map_err(refused)?;
-            }
+        let Some(run) = self.run.as_mut() else { return Ok(()) };
+        if !changed && self.settled && !self.in_event {
+            return Ok(());
         }
-        if was_in_event {
+        (self.settled, self.changed) = (false, true);
+        self.sweeper.driven.values.copy_from_slice(inputs);
+        self.sweeper.driven.course = None;
+        self.sweeper.drive_all().map_err(refused)?;
+        if self.in_event {
             run.leave_event_mode(&mut self.sweeper).map_err(refused)?;
+            run.restart();
             self.in_event = false;
+        } else {
+            run.turn(&mut self.sweeper, t).map_err(refused)?;
         }
-        self.shown |= changed || was_in_event;
-        Ok(changed || was_in_event)
+        (self.settled, self.shown) = (true, true);
+        Ok(())
     }
 
     /// One communication step; on a fault everything is as before.
@@ -79,12 +82,13 @@ impl Assembly {
             }
             self.polynomials.evaluate(from, &mut inputs);
         }
-        let changed = self.settle(&inputs)?;
+        self.settle(&inputs)?;
         // steps end where inputs may change again
-        let limit = if moving || changed { to } else { self.stop_time.unwrap_or(to) };
+        let limit = if moving || self.changed { to } else { self.stop_time.unwrap_or(to) };
         self.advance(to, limit, moving)?;
         self.finish_inputs(span, forget, moving);
         self.values[0] = to;
+        self.changed = false;
         self.count();
         Ok(())
     }
@@ -107,7 +111,7 @@ impl Assembly {
                 if run.t >= to - slack || run.t >= config.stop {
                     break;
                 }
-                run.advance(&mut self.sweeper, &config, limit.max(to)).map_err(refused)?;
+                run.advance(&mut self.sweeper, &config, limit).map_err(refused)?;
             }
             if run.reached() > to + slack {
                 self.shown = false;

@@ -59,10 +59,10 @@ impl Assembly {
         for reference in references {
             let called = standard.type_name(Kind::Float64);
             let v = self.layout.table.typed(*reference, standard, called, |kind| kind == Kind::Float64)?;
-            if self.phase == Phase::Instantiated {
-                check::has_value(v)?;
-            }
             computed |= matches!(v.entry.causality, Causality::Output | Causality::Local);
+        }
+        if self.phase == Phase::Instantiated {
+            references.iter().try_for_each(|r| check::has_value(self.layout.table.variable(*r)?))?;
         }
         if computed {
             self.show()?;
@@ -111,11 +111,11 @@ impl Assembly {
         for (i, reference) in references.iter().enumerate() {
             let v = layout.table.typed(*reference, self.interface.standard(), called, &is)?;
             check::settable(self.interface, self.phase, v)?;
-            check::acceptable(v, value(i), || self.value(*reference).unwrap_or(f64::NAN))?;
+            check::acceptable(v, value(i), || self.kept(*reference as usize))?;
         }
         let mut before = Vec::new();
         for (i, reference) in references.iter().enumerate() {
-            let kept = self.value(*reference)?;
+            let kept = self.kept(*reference as usize);
             if let Err(fault) = self.accept(*reference as usize, value(i)) {
                 for (reference, kept) in before.into_iter().rev() {
                     self.accept(reference, kept)?;
@@ -125,6 +125,14 @@ impl Assembly {
             before.push((*reference as usize, kept));
         }
         Ok(())
+    }
+
+    /// The value that a variable was set to last.
+    fn kept(&self, i: usize) -> f64 {
+        match self.layout.places[i] {
+            Place::Input(input) => self.inputs[input],
+            _ => self.values[i],
+        }
     }
 
     /// Takes over a value that may be set.
@@ -148,10 +156,14 @@ impl Assembly {
             Place::Gap(_) => {}
             Place::Element { .. } => {
                 if matches!(self.phase, Phase::StepMode | Phase::EventMode) {
+                    if self.values[i].to_bits() == value.to_bits() {
+                        return Ok(());
+                    }
                     self.begin_event()?;
                 }
+                self.hand(i, value)?;
+                self.values[i] = value;
                 self.stale = true;
-                return self.hand(i, value);
             }
         }
         Ok(())

@@ -45,6 +45,26 @@ pub enum Causality {
     Local,
 }
 
+/// An enumeration type.
+#[derive(Clone, Debug)]
+pub struct Enumeration {
+    /// Meaning
+    pub text: String,
+    /// Its items
+    pub items: Vec<Item>,
+}
+
+/// An item of an enumeration.
+#[derive(Clone, Debug)]
+pub struct Item {
+    /// Name
+    pub name: String,
+    /// Number
+    pub value: i64,
+    /// Meaning
+    pub text: String,
+}
+
 /// What the start value of a computed variable means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Initial {
@@ -149,8 +169,8 @@ pub struct Description {
     pub model_exchange: Option<Capabilities>,
     /// All variables, in their order
     pub variables: Vec<Variable>,
-    /// Items of enumerations by the name of the type
-    pub enumerations: HashMap<String, Vec<(String, i64)>>,
+    /// Enumerations by the name of the type
+    pub enumerations: HashMap<String, Enumeration>,
     /// Units by name
     pub units: HashMap<String, BaseUnit>,
     /// References of the inputs and states that an output depends on; `None`: on all
@@ -462,7 +482,8 @@ fn variable(
     })
 }
 
-fn enumerations(root: &Element) -> Result<HashMap<String, Vec<(String, i64)>>, DescriptionError> {
+fn enumerations(root: &Element) -> Result<HashMap<String, Enumeration>, DescriptionError> {
+    let text = |e: &Element| e.attribute("description").unwrap_or_default().to_owned();
     let mut types = HashMap::new();
     for element in root.inside("TypeDefinitions") {
         let typed = element.child("Enumeration").unwrap_or(element);
@@ -471,9 +492,11 @@ fn enumerations(root: &Element) -> Result<HashMap<String, Vec<(String, i64)>>, D
         }
         let items = typed.all("Item").map(|item| {
             let value = optional(item, "value")?.ok_or_else(|| missing(item, "value"))?;
-            Ok((required(item, "name")?.to_owned(), value))
+            Ok(Item { name: required(item, "name")?.to_owned(), value, text: text(item) })
         });
-        types.insert(required(element, "name")?.to_owned(), items.collect::<Result<_, DescriptionError>>()?);
+        let items = items.collect::<Result<_, DescriptionError>>()?;
+        let name = required(element, "name")?.to_owned();
+        types.insert(name, Enumeration { text: text(element), items });
     }
     Ok(types)
 }

@@ -8,8 +8,8 @@ mod instance;
 pub use archive::{Archive, ArchiveError};
 pub use binding::{Fault, LibraryError, Status, Stepped, Update};
 pub use description::{
-    Capabilities, Causality, Description, DescriptionError, Experiment, Initial, Variable, VariableKind,
-    Version,
+    Capabilities, Causality, Description, DescriptionError, Enumeration, Experiment, Initial, Item, Variable,
+    VariableKind, Version,
 };
 pub use instance::{Counts, Instance, Interface, Saved};
 

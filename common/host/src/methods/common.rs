@@ -269,6 +269,11 @@ impl Run {
             && self.solver.fits(&state.solver)
     }
 
+    /// The integrator forgets its past: after a jump that it does not see.
+    pub(crate) fn restart(&mut self) {
+        self.solver.restart();
+    }
+
     /// Counters of the integrator.
     pub(crate) fn statistics(&self) -> Statistics {
         self.solver.statistics
