@@ -108,6 +108,7 @@ impl<M: Model> Instance<M> {
         let event = model.with_system(Step {
             from,
             to,
+            interval: step,
             u: given,
             course,
             leave_events,
@@ -117,6 +118,7 @@ impl<M: Model> Instance<M> {
             d: discrete,
             solver,
             statistics,
+            linear: &mut self.linear,
         })?;
         *guarded = h;
         SolverCounters::from(*statistics).store(&mut values[Layout::<M>::COUNTERS]);

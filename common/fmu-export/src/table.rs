@@ -170,6 +170,10 @@ impl Table {
         let plain = |name: String, entry: Entry| Variable { name, entry, derivative_of: None };
         let mut variables: Vec<_> =
             Layout::<M>::SECTIONS.into_iter().flatten().map(|entry| plain(entry.name(), *entry)).collect();
+        #[allow(clippy::cast_precision_loss, reason = "a small number")]
+        {
+            variables[Layout::<M>::SOLVER.start].entry.start = M::METHOD as f64;
+        }
         let mut states = Vec::new();
         if M::MODEL_EXCHANGE {
             states.extend((0..variables.len()).filter(|i| variables[*i].entry.rate.is_some()));

@@ -11,7 +11,7 @@ use fmu_export::{
 use model::{Kind, Variability, Variables};
 
 use super::layout::Layout;
-use super::state::Backup;
+use super::state::{Backup, Flags};
 use super::{AssemblyError, AssemblyState, refused};
 use crate::methods::{Choices, Config, MethodKind, Run};
 use crate::run::Scene;
@@ -41,16 +41,7 @@ pub struct Assembly {
     pub(super) inputs: Vec<f64>,
     /// Value of `port.reset` at which the history was last emptied
     pub(super) reset_seen: f64,
-    /// In Initialization Mode: values were set since all were in step
-    pub(super) stale: bool,
-    /// The elements are in Event Mode, where something was set that changes at events only
-    pub(super) in_event: bool,
-    /// Something was taken over since the last step
-    pub(super) changed: bool,
-    /// What was set is taken over
-    pub(super) settled: bool,
-    /// The elements stand at the present time
-    pub(super) shown: bool,
+    pub(super) flags: Flags,
     pub(super) backup: Backup,
     warnings: Vec<String>,
 }
@@ -62,6 +53,9 @@ pub(super) struct Loaded {
     pub(super) layout: Layout,
     pub(super) sweeper: Sweeper,
 }
+
+/// Numbers of the methods in `solver.method` that the host integrates with: heun, rk4, dopri5, dop853.
+const OFFERED: &[i64] = &[1, 2, 3, 4];
 
 /// Communication step of the default experiment: the interval of recording, at most 1000 of them.
 pub(super) fn experiment_step(config: &Config) -> f64 {
@@ -105,11 +99,7 @@ impl Assembly {
             given: Vec::new(),
             inputs: Vec::new(),
             reset_seen: 0.0,
-            stale: true,
-            in_event: false,
-            changed: false,
-            settled: true,
-            shown: true,
+            flags: Flags::START,
             warnings: Vec::new(),
         };
         assembly.start_over();
@@ -126,14 +116,13 @@ impl Assembly {
         self.run = None;
         self.phase = Phase::Instantiated;
         (self.start_time, self.stop_time, self.reset_seen) = (0.0, None, 0.0);
-        (self.stale, self.in_event, self.shown) = (true, false, true);
-        (self.changed, self.settled) = (false, true);
+        self.flags = Flags::START;
         self.warnings.clear();
     }
 
     /// Settings of the integrator as the host has set them.
     pub(super) fn configured(&self) -> Result<Config, Fault> {
-        let settings = SolverParameters::load(&self.values[self.layout.solver.clone()]).settings()?;
+        let settings = SolverParameters::load(&self.values[self.layout.solver.clone()]).settings(OFFERED)?;
         Ok(Config {
             integrator: settings.method,
             step: Some(settings.step),
@@ -176,10 +165,10 @@ impl Assembly {
 
     /// In Initialization Mode: closes the joints and brings all values in step.
     pub(super) fn close(&mut self) -> Result<(), Fault> {
-        if self.stale {
+        if self.flags.stale {
             self.sweeper.driven.values.clone_from(&self.inputs);
             self.sweeper.drive_all().and_then(|()| start::close(&mut self.sweeper)).map_err(refused)?;
-            self.stale = false;
+            self.flags.stale = false;
         }
         Ok(())
     }
@@ -267,7 +256,7 @@ impl Exported for Assembly {
             self.warnings.extend(instance.messages().into_iter().map(|message| format!("{name}: {message}")));
         }
         self.config = config;
-        self.shown = true;
+        self.flags.shown = true;
         self.reset_seen = self.reset_signal();
         self.history.clear();
         self.history.push(self.start_time, &self.given);

@@ -21,15 +21,33 @@ pub struct AssemblyState {
     inputs: Vec<f64>,
     history: History,
     reset_seen: f64,
-    stale: bool,
-    in_event: bool,
-    changed: bool,
-    settled: bool,
-    shown: bool,
+    flags: Flags,
     sweep: SweepState,
     run: Option<RunState>,
     /// States of the elements as bytes, so that they do not belong to the instances that made them
     elements: Vec<Vec<u8>>,
+}
+
+/// How far the elements have heard of what was set.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[allow(clippy::struct_excessive_bools, reason = "each is set and asked by itself")]
+pub(super) struct Flags {
+    /// In Initialization Mode: values were set since all were in step
+    pub(super) stale: bool,
+    /// The elements are in Event Mode, where something was set that changes at events only
+    pub(super) in_event: bool,
+    /// Something was taken over since the last step
+    pub(super) changed: bool,
+    /// What was set is taken over
+    pub(super) settled: bool,
+    /// The elements stand at the present time
+    pub(super) shown: bool,
+}
+
+impl Flags {
+    /// Of a fresh instance.
+    pub(super) const START: Self =
+        Self { stale: true, in_event: false, changed: false, settled: true, shown: true };
 }
 
 /// Where a step began.
@@ -38,7 +56,7 @@ pub(super) struct Backup {
     elements: Vec<Option<Saved>>,
     run: Option<RunState>,
     sweep: Option<SweepState>,
-    flags: [bool; 4],
+    flags: Option<Flags>,
 }
 
 impl Backup {
@@ -65,8 +83,8 @@ impl Assembly {
 
     /// Remembers where a step begins.
     pub(super) fn keep(&mut self) -> Result<(), Fault> {
-        let Self { backup, sweeper, run, in_event, changed, settled, shown, .. } = self;
-        backup.flags = [*in_event, *changed, *settled, *shown];
+        let Self { backup, sweeper, run, flags, .. } = self;
+        backup.flags = Some(*flags);
         backup.sweep = Some(sweeper.save());
         backup.run = run.as_ref().map(Run::save);
         backup.elements.resize_with(sweeper.instances.len(), || None);
@@ -81,7 +99,7 @@ impl Assembly {
     /// Back to where the step began.
     pub(super) fn go_back(&mut self) {
         let Self { backup, sweeper, run, .. } = self;
-        [self.in_event, self.changed, self.settled, self.shown] = backup.flags;
+        self.flags = backup.flags.unwrap_or(self.flags);
         let elements = &backup.elements;
         let restored = sweeper.each(|node, instance| match &elements[node] {
             Some(saved) => instance.restore(saved),
@@ -117,11 +135,7 @@ impl Assembly {
             inputs: self.inputs.clone(),
             history: self.history.clone(),
             reset_seen: self.reset_seen,
-            stale: self.stale,
-            in_event: self.in_event,
-            changed: self.changed,
-            settled: self.settled,
-            shown: self.shown,
+            flags: self.flags,
             sweep: self.sweeper.save(),
             run: self.run.as_ref().map(Run::save),
             elements,
@@ -142,8 +156,7 @@ impl Assembly {
         self.inputs.clone_from(&saved.inputs);
         self.history.clone_from(&saved.history);
         self.reset_seen = saved.reset_seen;
-        (self.stale, self.in_event, self.shown) = (saved.stale, saved.in_event, saved.shown);
-        (self.changed, self.settled) = (saved.changed, saved.settled);
+        self.flags = saved.flags;
         self.config = self.configured()?;
         self.run = match &saved.run {
             None => None,

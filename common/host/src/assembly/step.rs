@@ -23,12 +23,12 @@ impl Assembly {
     /// Something changes that changes at events only: the elements go to Event Mode at the present time.
     pub(super) fn begin_event(&mut self) -> Result<(), Fault> {
         let t = self.values[0];
-        let Some(run) = self.run.as_mut().filter(|_| !self.in_event) else { return Ok(()) };
+        let Some(run) = self.run.as_mut().filter(|_| !self.flags.in_event) else { return Ok(()) };
         if run.is_ahead() {
             run.turn(&mut self.sweeper, t).map_err(refused)?;
         }
         run.enter_event_mode(&mut self.sweeper).map_err(refused)?;
-        (self.in_event, self.shown) = (true, true);
+        (self.flags.in_event, self.flags.shown) = (true, true);
         Ok(())
     }
 
@@ -38,21 +38,21 @@ impl Assembly {
         let t = self.values[0];
         let changed = !identical(inputs, &self.sweeper.driven.values);
         let Some(run) = self.run.as_mut() else { return Ok(()) };
-        if !changed && self.settled && !self.in_event {
+        if !changed && self.flags.settled && !self.flags.in_event {
             return Ok(());
         }
-        (self.settled, self.changed) = (false, true);
+        (self.flags.settled, self.flags.changed) = (false, true);
         self.sweeper.driven.values.copy_from_slice(inputs);
         self.sweeper.driven.course = None;
         self.sweeper.drive_all().map_err(refused)?;
-        if self.in_event {
+        if self.flags.in_event {
             run.leave_event_mode(&mut self.sweeper).map_err(refused)?;
             run.restart();
-            self.in_event = false;
+            self.flags.in_event = false;
         } else {
             run.turn(&mut self.sweeper, t).map_err(refused)?;
         }
-        (self.settled, self.shown) = (true, true);
+        (self.flags.settled, self.flags.shown) = (true, true);
         Ok(())
     }
 
@@ -84,11 +84,11 @@ impl Assembly {
         }
         self.settle(&inputs)?;
         // steps end where inputs may change again
-        let limit = if moving || self.changed { to } else { self.stop_time.unwrap_or(to) };
+        let limit = if moving || self.flags.changed { to } else { self.stop_time.unwrap_or(to) };
         self.advance(to, limit, moving)?;
         self.finish_inputs(span, forget, moving);
         self.values[0] = to;
-        self.changed = false;
+        self.flags.changed = false;
         self.count();
         Ok(())
     }
@@ -105,7 +105,7 @@ impl Assembly {
             self.sweeper.driven.course = Some(self.polynomials.clone());
         }
         let most = run.statistics().rhs_evaluations + MAX_EVALUATIONS;
-        self.shown = true;
+        self.flags.shown = true;
         loop {
             if !run.is_ahead() {
                 if run.t >= to - slack || run.t >= config.stop {
@@ -114,7 +114,7 @@ impl Assembly {
                 run.advance(&mut self.sweeper, &config, limit).map_err(refused)?;
             }
             if run.reached() > to + slack {
-                self.shown = false;
+                self.flags.shown = false;
                 break;
             }
             run.accept(&mut self.sweeper).map_err(refused)?;

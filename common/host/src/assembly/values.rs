@@ -28,9 +28,9 @@ impl Assembly {
                 self.inputs = inputs;
                 result?;
                 let t = self.values[0];
-                if let Some(run) = self.run.as_mut().filter(|_| !self.shown) {
+                if let Some(run) = self.run.as_mut().filter(|_| !self.flags.shown) {
                     run.look(&mut self.sweeper, t).map_err(refused)?;
-                    self.shown = true;
+                    self.flags.shown = true;
                 }
                 Ok(())
             }
@@ -147,7 +147,7 @@ impl Assembly {
             Place::Input(input) => {
                 self.given[input] = value;
                 self.inputs[input] = value;
-                self.stale = true;
+                self.flags.stale = true;
                 if matches!(self.phase, Phase::Instantiated) {
                     // a start value
                     return self.hand(i, value);
@@ -163,7 +163,7 @@ impl Assembly {
                 }
                 self.hand(i, value)?;
                 self.values[i] = value;
-                self.stale = true;
+                self.flags.stale = true;
             }
         }
         Ok(())
