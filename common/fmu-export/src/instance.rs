@@ -189,7 +189,7 @@ impl<M: Model> Instance<M> {
             None
         } else {
             let solver = SolverParameters::load(&self.state.values[Layout::<M>::SOLVER]);
-            Some(Solver::new(solver.settings()?)?)
+            Some(Solver::new(solver.settings(M::METHODS)?)?)
         };
         self.port()?;
         self.assemble()?;

@@ -8,7 +8,7 @@ use integrators::{
 };
 use model::Matrix;
 use model::{
-    EvaluationError, Group, Model, Outputs, ParameterError, Spectrum, System, Variables, Visitor,
+    EvaluationError, Group, Model, Outputs, Pace, ParameterError, Spectrum, System, Variables, Visitor,
     state_jacobian,
 };
 use num_dual::Dual64;
@@ -307,6 +307,18 @@ impl<const N: usize, const Z: usize, Y: System<N, Z>> Indicators<N, Z> for Drive
 }
 
 impl<const N: usize, const Z: usize, Y: System<N, Z>> Driven<'_, N, Z, Y> {
+    /// Take the method that suits the equations at `t`; the time after which to ask again.
+    fn choose_method(&self, t: f64, x: &[f64; N], solver: &mut Solver) -> f64 {
+        inputs_at!(self, t, u);
+        let Pace { stiff, span } = self.system.pace(t, x, u, &self.d);
+        let method = if stiff { Method::Radau5 } else { Method::Dop853 };
+        if method != solver.settings().method {
+            *solver = solver.with_method(method);
+            solver.reset();
+        }
+        span
+    }
+
     /// Carry out the time events that are due at `t`.
     fn pass_events(&mut self, t: f64, x: &mut [f64; N], solver: &mut Solver) {
         for _ in 0..MAX_UPDATES {
@@ -331,6 +343,8 @@ pub(crate) struct Step<'a, M: Model> {
     pub(crate) course: Option<Course<'a>>,
     /// Leave events at the end of the step to Event Mode
     pub(crate) leave_events: bool,
+    /// The method follows the stiffness of the equations
+    pub(crate) auto: bool,
     /// Look at the eigenvalues first (fixed-step explicit methods)
     pub(crate) guard: bool,
     pub(crate) duals: &'a mut [Dual64],
@@ -379,7 +393,13 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
             if t >= to {
                 break;
             }
-            let target = system.next_event(&driven.d).filter(|event| *event < to).unwrap_or(to);
+            let mut target = system.next_event(&driven.d).filter(|event| *event < to).unwrap_or(to);
+            if self.auto {
+                let span = driven.choose_method(t, &x, &mut solver);
+                if span < 0.75 * (target - t) {
+                    target = t + span;
+                }
+            }
             if Z == 0 {
                 solver.advance(&driven, t, target, &mut x, &mut statistics).map_err(fault)?;
                 t = target;
