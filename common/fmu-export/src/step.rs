@@ -6,9 +6,9 @@ use crate::inputs::{PortParameters, Span};
 use crate::instance::SAME_TIME;
 use crate::jobs::{Course, Step};
 use crate::phase::{Interface, Phase};
+use crate::solver::AutoCounters;
 use crate::state::State;
 use crate::table::Layout;
-use crate::solver::AutoCounters;
 use crate::{Fault, InputTreatment, Instance, SolverCounters, SolverParameters};
 
 /// Relative change of the inner step from which the stability guard looks again.
@@ -142,6 +142,7 @@ impl<M: Model> Instance<M> {
         let event = model.with_system(Step {
             from,
             to,
+            interval: step,
             u: given,
             course,
             leave_events,
@@ -152,6 +153,7 @@ impl<M: Model> Instance<M> {
             d: discrete,
             solver,
             statistics,
+            linear: &mut self.linear,
         })?;
         *guarded = h;
         SolverCounters::from(*statistics).store(&mut values[Layout::<M>::COUNTERS]);

@@ -24,6 +24,20 @@ pub struct Pace {
     pub span: f64,
 }
 
+/// The first states follow `y' = A y + b + c sin(omega t + phase)`, with `A` constant as long as inertias at the ports are
+/// and `b` linear in the inputs; the other states are integrals of these.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linear<const N: usize> {
+    /// Number of these states
+    pub states: usize,
+    /// c
+    pub amplitude: [f64; N],
+    /// omega [rad/s]
+    pub omega: f64,
+    /// Phase at t = 0 [rad]
+    pub phase: f64,
+}
+
 /// Output variables that are computed together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Group {
@@ -226,6 +240,15 @@ pub trait System<const N: usize, const Z: usize> {
         _d: &<Self::Model as Model>::Discrete,
     ) -> Pace {
         Pace { stiff: false, span: f64::INFINITY }
+    }
+
+    /// How the equations are linear now, for `solver.method = exact`; otherwise another method takes the step.
+    fn linear(
+        &self,
+        _u: &<Self::Model as Model>::Inputs<f64>,
+        _d: &<Self::Model as Model>::Discrete,
+    ) -> Option<Linear<N>> {
+        None
     }
 
     /// How far orientations are off their manifold (unit quaternions, unit vectors).

@@ -45,7 +45,8 @@ impl Visitor<RvdpAbsorber> for Cost {
         let mut x = [0.01; N];
         let d = <RvdpAbsorber as Model>::Discrete::default();
         let time = nanoseconds(|| {
-            let rates: Result<[f64; N], EvaluationError> = system.rates(0.1, black_box(&x), black_box(&self.0), &d);
+            let rates: Result<[f64; N], EvaluationError> =
+                system.rates(0.1, black_box(&x), black_box(&self.0), &d);
             x[1] = 0.1 + 1e-9 * black_box(rates.map_or(0.0, |rates| rates[1]));
         });
         (N, time)
@@ -56,13 +57,15 @@ fn main() {
     let starts = |table: &[model::Entry]| -> Vec<f64> { table.iter().map(|entry| entry.start).collect() };
     let inputs = Inputs::load(&starts(<Inputs as Variables<f64>>::TABLE));
     let motion = Motion::load(&starts(<Motion as Variables<f64>>::TABLE));
-    let (m, c, gamma, omega, amplitude) = (5.0, 800.0, 10.0, 12.566_370_614_359_172, 0.063_325_739_776_461_11);
+    let (m, c, gamma, omega, amplitude) =
+        (5.0, 800.0, 10.0, 12.566_370_614_359_172, 0.063_325_739_776_461_11);
     let mut x = [0.01, 0.01];
     let bare = nanoseconds(|| {
         let [y, w] = *black_box(&x);
         let (gamma, omega, a) = black_box((gamma, omega, 0.0));
         let square = omega * omega;
-        let force = -0.5 * gamma * m * (w * w + square * (y * y - amplitude * amplitude)) * w - (m * square - c) * y;
+        let force =
+            -0.5 * gamma * m * (w * w + square * (y * y - amplitude * amplitude)) * w - (m * square - c) * y;
         let rate = (force - c * y) / m - a;
         x[1] = 0.1 + 1e-9 * black_box([w, rate])[1];
     });
@@ -71,9 +74,11 @@ fn main() {
     let mut stop = Parameters::default();
     stop.stop.used = true;
     stop.control.use_limit = true;
-    for (name, parameters) in
-        [("two states", plain), ("with energies", Parameters::default()), ("with energies, stop, limit", stop)]
-    {
+    for (name, parameters) in [
+        ("two states", plain),
+        ("with energies", Parameters::default()),
+        ("with energies, stop, limit", stop),
+    ] {
         let Ok(absorber) = RvdpAbsorber::new(&parameters, &motion) else {
             continue;
         };

@@ -39,7 +39,8 @@ fn the_papers_law_has_the_values_of_the_table() {
         close(design.eta, eta, force, 1e-12, "eta"); // 2 F^ cos(alpha) - 1 may cancel
         close(design.n, n, 2.0 * F_d * omega * m / (gamma * H0), 1e-12, "n");
         close(design.X, X, 0.0, 1e-12, "X");
-        let terms = [0.5 * gamma * m * w * w * w, m * omega * omega * x, F_d / X * x, F_d / (omega * X) * w, c * x];
+        let terms =
+            [0.5 * gamma * m * w * w * w, m * omega * omega * x, F_d / X * x, F_d / (omega * X) * w, c * x];
         let scale = terms.iter().fold(0.0_f64, |largest, term| largest.max(term.abs()));
         close(law.paper(omega, x, w).expect("no pole"), F1, scale, 1e-12, "F1 (14)");
         close(law.direct(omega, x, w), F1, scale, 1e-12, "F1 (16)");

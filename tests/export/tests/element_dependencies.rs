@@ -85,8 +85,11 @@ fn primary_oscillator_dependencies_are_exact() {
 
 #[test]
 fn rvdp_absorber_dependencies_are_exact() {
-    let general = [("axis.x", 0.3), ("axis.y", -0.4), ("gravity.x", 1.0), ("gravity.y", 2.0), ("gravity.z", 3.0)];
-    let kind = |kind: f64, law: f64| [("port.kind", kind), ("control.law", law), ("control.force", 3.0), ("w.start", 0.2)];
+    let general =
+        [("axis.x", 0.3), ("axis.y", -0.4), ("gravity.x", 1.0), ("gravity.y", 2.0), ("gravity.z", 3.0)];
+    let kind = |kind: f64, law: f64| {
+        [("port.kind", kind), ("control.law", law), ("control.force", 3.0), ("w.start", 0.2)]
+    };
     declared_are_observed::<RvdpAbsorber>(&[
         &[&kind(1.0, 2.0)[..], &general].concat(),
         &[&kind(1.0, 3.0)[..], &general].concat(),

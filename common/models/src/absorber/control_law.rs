@@ -91,7 +91,8 @@ impl ControlLaw {
         let n = force * omega * (2.0 * sin_alpha * m / (gamma * H0)) - 1.0;
         let n_eta = n * eta;
         if n_eta.re().abs() < POLE {
-            let quantity = "n eta of the paper's law (14), by control.force, control.alpha and control.energy,";
+            let quantity =
+                "n eta of the paper's law (14), by control.force, control.alpha and control.energy,";
             return Err(EvaluationError::Vanishes { quantity, value: n_eta.re().abs(), limit: POLE });
         }
         Ok(Inverse { n, eta, l })
@@ -133,10 +134,22 @@ fn limit_cycle<S: Scalar>(r: S, p: S) -> Option<S> {
         return None;
     }
     let companion = Matrix::<f64, 4, 4>::from_row_slice(&[
-        r_ + 1.0, 0.0, p_, -p_ * r_, //
-        1.0, 0.0, 0.0, 0.0, //
-        0.0, 1.0, 0.0, 0.0, //
-        0.0, 0.0, 1.0, 0.0,
+        r_ + 1.0,
+        0.0,
+        p_,
+        -p_ * r_, //
+        1.0,
+        0.0,
+        0.0,
+        0.0, //
+        0.0,
+        1.0,
+        0.0,
+        0.0, //
+        0.0,
+        0.0,
+        1.0,
+        0.0,
     ]);
     let roots = Dense::eigenvalues(&companion)?;
     let real = roots.iter().filter(|(re, im)| *re > 0.0 && im.abs() <= 1e-7 * re).map(|(re, _)| *re);

@@ -176,8 +176,7 @@ impl RvdpAbsorber {
 
 impl Model for RvdpAbsorber {
     const NAME: &'static str = "rvdp_absorber";
-    const DESCRIPTION: &'static str =
-        "Vibration absorber whose controlled force makes it a Rayleigh-van-der-Pol oscillator at the drive's frequency";
+    const DESCRIPTION: &'static str = "Vibration absorber whose controlled force makes it a Rayleigh-van-der-Pol oscillator at the drive's frequency";
     const EXPERIMENT: Experiment = Experiment { stop: 10.0, step: 0.01 };
     const DOCUMENTATION: Documentation = model::documentation!(
         "rvdp_absorber",
@@ -308,8 +307,7 @@ where
         _d: &Discrete,
     ) -> Result<Inertia<S>, EvaluationError> {
         let zero = S::lift(0.0);
-        let nothing =
-            Inertia { P_F0: zero, P_M: zero, A_F0: Vector3::zeros(), A_M: SymmetricTensor::zero() };
+        let nothing = Inertia { P_F0: zero, P_M: zero, A_F0: Vector3::zeros(), A_M: SymmetricTensor::zero() };
         let R = self.forces(x[0], x[1], u)?.R;
         if !self.spatial() {
             return Ok(Inertia { P_F0: R + self.p.m * self.g_e, ..nothing });

@@ -29,13 +29,7 @@ pub struct Control {
     #[var(name = "control.gamma", start = 10.0, min = 0.0, nominal = 10.0, tunable)]
     pub gamma: f64,
     /// Wanted amplitude of x, law direct [m]
-    #[var(
-        name = "control.amplitude",
-        start = 0.063_325_739_776_461_11,
-        above = 0.0,
-        nominal = 0.1,
-        tunable
-    )]
+    #[var(name = "control.amplitude", start = 0.063_325_739_776_461_11, above = 0.0, nominal = 0.1, tunable)]
     pub X: f64,
     /// Amplitude of the design force [N]
     #[var(name = "control.force", start = 0.0, min = 0.0, nominal = 10.0, tunable)]
