@@ -130,7 +130,7 @@ def coupled(fmu, name, **how):
     scene.set("primary", **case["primary_oscillator"])
     scene.set("absorber", **case["rvdp_absorber"])
     result = scene.run(stop=t[-1], interval=t[1] - t[0], **how)
-    pairs = [(f"{part}.{c}", v) for c, v in columns.items() for part in ("primary", "absorber")]
+    pairs = [(f"{part}{c}", v) for c, v in columns.items() for part in ("", "primary.", "absorber.")]
     return max(np.abs(result[n] - v).max() / np.abs(v).max() for n, v in pairs if n in result)
 
 

@@ -132,7 +132,7 @@ def main():
         print(f"{name:26}" + "".join(f"{v:9.4g}" for v in mm) + f"     {row[5]:9.4g}{row[6]:9.4g}", flush=True)
         rows.append([name, *row])
     _write(out / "cases.csv", ["case", "rvdp_mm", "rvdp_harmonic_mm", "none_mm", "passive_mm", "den_hartog_mm", "force_rms_N", "power_W"], rows)
-    ratios = 1.0 + np.array([-20, -15, -10, -7, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 7, 10, 15, 20]) / 100.0
+    ratios = 1.0 + np.array([-20, -10, -5, -3, -1, 0, 1, 3, 5, 10, 20]) / 100.0
     columns = detuning(ratios)
     _write(out / "detuning.csv", ["ratio", *columns], zip(ratios, *columns.values()))
     draw(ratios, columns, paths.ROOT / "docs" / "absorber_detuning.png")
