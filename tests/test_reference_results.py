@@ -215,6 +215,28 @@ def test_primary_oscillator(packed):
     assert result["energy.dissipated"][-1] == pytest.approx(heat, rel=1e-7)
 
 
+def test_rvdp_absorber(packed):
+    """The absorber on a base at rest, with the powers of its damper and controller as two more states."""
+    result = packed("rvdp_absorber")
+    m, c, d, gamma, w, X = 5.0, 800.0, 2.5, 10.0, 4.0 * np.pi, 0.06332573977646111
+
+    def force(x, v):
+        return -0.5 * gamma * m * (v * v + w * w * (x * x - X * X)) * v - (m * w * w - c) * x + d * v
+
+    def rhs(_, state):
+        x, v = state[:2]
+        F = force(x, v)
+        return [v, (F - c * x - d * v) / m, d * v * v, F * v]
+
+    x, v, heat, work = solve_ivp(rhs, (0.0, result.t[-1]), [0.01, 0.0, 0.0, 0.0], t_eval=result.t, **TIGHT).y
+    F = force(x, v)
+    expected = {"x": x, "w": v, "control.F1": F, "control.power": F * v}
+    expected |= {name: c * x + d * v - F for name in ("P.F", "P.F0")}
+    expected |= {"energy.kinetic": 0.5 * m * v * v, "energy.potential": 0.5 * c * x * x}
+    expected |= {"energy.dissipated": heat, "energy.supplied": work}
+    assert compare(result, expected, 1e-9) == []
+
+
 # a run at default settings ----------------------------------------------------------------------------------------
 @pytest.mark.parametrize("name", NAMES)
 def test_run_at_default_settings(fmu, packed, name):

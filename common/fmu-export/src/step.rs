@@ -5,9 +5,10 @@ use model::{Model, Variables};
 use crate::inputs::{PortParameters, Span};
 use crate::jobs::{Course, Step};
 use crate::phase::{Interface, Phase};
+use crate::solver::AutoCounters;
 use crate::state::State;
 use crate::table::Layout;
-use crate::{Fault, InputTreatment, Instance, SolverCounters, times};
+use crate::{Fault, InputTreatment, Instance, SolverCounters, SolverParameters, times};
 
 /// Relative change of the inner step from which the stability guard looks again.
 const SAME_STEP: f64 = 1e-6;
@@ -112,6 +113,7 @@ impl<M: Model> Instance<M> {
             u: given,
             course,
             leave_events,
+            auto: SolverParameters::load(&values[Layout::<M>::SOLVER]).auto(),
             guard: fixed && (h - *guarded).abs() > SAME_STEP * h,
             duals: &mut self.duals[Layout::<M>::INPUTS],
             x,
@@ -122,6 +124,9 @@ impl<M: Model> Instance<M> {
         })?;
         *guarded = h;
         SolverCounters::from(*statistics).store(&mut values[Layout::<M>::COUNTERS]);
+        if let [jacobians] = &mut values[Layout::<M>::AUTO_COUNTERS] {
+            AutoCounters { jacobians: statistics.jacobians }.store(std::slice::from_mut(jacobians));
+        }
         self.finish_inputs(span, settled, forget);
         self.state.values[0] = to;
         self.state.fresh = 0;

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use model::{Causality, Entry, Group, Kind, Model, Variability, Variables, count_states};
 
 use crate::inputs::{PortParameters, PortReset};
+use crate::solver::{AutoCounters, defaults, offers_auto};
 use crate::{Fault, SolverCounters, SolverParameters, Standard};
 
 /// Where each group of variables of the model `M` lies in the list, fixed at compile time.
@@ -40,15 +41,19 @@ impl<M: Model> Layout<M> {
         <M::Dynamics<f64> as Variables<f64>>::TABLE,
         <M::Energy<f64> as Variables<f64>>::TABLE,
     ];
-    /// Ends of these sections, then of rates, indicators and counters.
-    const ENDS: [usize; 13] = {
-        let mut ends = [0; 13];
+    /// Counters beside those of every solver.
+    const FURTHER_COUNTERS: &'static [Entry] =
+        if offers_auto::<M>() { <AutoCounters as Variables<f64>>::TABLE } else { &[] };
+    /// Ends of these sections, then of rates, indicators, counters and further counters.
+    const ENDS: [usize; 14] = {
+        let mut ends = [0; 14];
         let (mut at, mut i) = (0, 0);
-        while i < 13 {
+        while i < 14 {
             at += match i {
                 10 => Self::STATES,
                 11 => M::INDICATORS.len(),
                 12 => <SolverCounters as Variables<f64>>::TABLE.len(),
+                13 => Self::FURTHER_COUNTERS.len(),
                 i => Self::SECTIONS[i].len(),
             };
             ends[i] = at;
@@ -64,6 +69,7 @@ impl<M: Model> Layout<M> {
     pub(crate) const MOTION: Range<usize> = Self::section(6);
     pub(crate) const RATES: Range<usize> = Self::section(10);
     pub(crate) const COUNTERS: Range<usize> = Self::section(12);
+    pub(crate) const AUTO_COUNTERS: Range<usize> = Self::section(13);
 
     const fn section(i: usize) -> Range<usize> {
         Self::ENDS[i - 1]..Self::ENDS[i]
@@ -170,10 +176,7 @@ impl Table {
         let plain = |name: String, entry: Entry| Variable { name, entry, derivative_of: None };
         let mut variables: Vec<_> =
             Layout::<M>::SECTIONS.into_iter().flatten().map(|entry| plain(entry.name(), *entry)).collect();
-        #[allow(clippy::cast_precision_loss, reason = "a small number")]
-        {
-            variables[Layout::<M>::SOLVER.start].entry.start = M::METHOD as f64;
-        }
+        defaults::<M>(&mut variables[Layout::<M>::SOLVER]);
         let mut states = Vec::new();
         if M::MODEL_EXCHANGE {
             states.extend((0..variables.len()).filter(|i| variables[*i].entry.rate.is_some()));
@@ -182,7 +185,7 @@ impl Table {
             variables.push(derivative(*state, &variables[*state]));
         }
         variables.extend(M::INDICATORS.iter().map(|name| plain((*name).into(), INDICATOR)));
-        let counters = <SolverCounters as Variables<f64>>::TABLE.iter();
+        let counters = <SolverCounters as Variables<f64>>::TABLE.iter().chain(Layout::<M>::FURTHER_COUNTERS);
         variables.extend(counters.map(|entry| plain(entry.name(), *entry)));
 
         let access =
@@ -373,6 +376,9 @@ pub fn allowed(entry: &Entry) -> String {
     if let Kind::Enumeration(t) = entry.kind {
         let items: Vec<_> = t.items.iter().map(|i| format!("{} ({})", i.name, i.value)).collect();
         return items.join(", ");
+    }
+    if entry.switch {
+        return "0 or 1".into();
     }
     let above = entry.min > 0.0 && entry.min <= f64::MIN_POSITIVE;
     match (entry.min.is_finite(), entry.max.is_finite()) {

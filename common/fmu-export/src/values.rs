@@ -223,11 +223,14 @@ pub(crate) fn possible<'a>(entries: impl Iterator<Item = &'a Entry>, values: &[f
 }
 
 /// True if `value` may be set.
-#[allow(clippy::float_cmp, reason = "items are whole numbers")]
+#[allow(clippy::float_cmp, reason = "items and switches are whole numbers")]
 fn in_range(entry: &Entry, value: f64) -> bool {
     if let Kind::Enumeration(t) = entry.kind {
         #[allow(clippy::cast_precision_loss, reason = "items are small")]
         return t.items.iter().any(|i| i.value as f64 == value);
+    }
+    if entry.switch {
+        return value == 0.0 || value == 1.0;
     }
     value.is_finite() && value >= entry.min && value <= entry.max
 }

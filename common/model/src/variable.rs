@@ -111,6 +111,8 @@ pub struct Entry {
     pub max: f64,
     /// Typical magnitude
     pub nominal: f64,
+    /// Takes 0 and 1 only
+    pub switch: bool,
     /// Inputs and states that the value depends on directly: names, groups by prefix (`P.F`), or the
     /// same component of a group (`A.r.@`); a state depends on itself without being named
     pub depends: &'static [&'static str],
@@ -144,6 +146,8 @@ pub struct Attributes {
     pub tunable: bool,
     /// Changes at events only
     pub discrete: bool,
+    /// Takes 0 and 1 only
+    pub switch: bool,
     /// What the port does whose variables these are
     pub port: PortLaw,
     /// What the start value means
@@ -196,6 +200,7 @@ impl Entry {
             min: f64::NEG_INFINITY,
             max: f64::INFINITY,
             nominal: 1.0,
+            switch: false,
             depends: &[],
             rate: None,
             port: PortLaw::Regular,
@@ -251,6 +256,9 @@ impl Entry {
             self.start = a.start[0];
         } else if a.start.len() > 1 {
             self.start = a.start[component];
+        }
+        if a.switch {
+            (self.switch, self.min, self.max) = (true, 0.0, 1.0);
         }
         if let Some(min) = a.min {
             self.min = min;

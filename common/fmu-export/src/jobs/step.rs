@@ -24,6 +24,8 @@ pub(crate) struct Step<'a, M: Model> {
     pub(crate) course: Option<Course<'a>>,
     /// Leave events at the end of the step to Event Mode
     pub(crate) leave_events: bool,
+    /// The method follows the stiffness of the equations
+    pub(crate) auto: bool,
     /// Look at the eigenvalues first (fixed-step explicit methods)
     pub(crate) guard: bool,
     pub(crate) duals: &'a mut [Dual64],
@@ -74,7 +76,13 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
             if t >= to {
                 break;
             }
-            let target = system.next_event(&driven.d).filter(|event| *event < to).unwrap_or(to);
+            let mut target = system.next_event(&driven.d).filter(|event| *event < to).unwrap_or(to);
+            if self.auto {
+                let span = driven.choose_method(t, &x, &mut solver);
+                if span < 0.75 * (target - t) {
+                    target = t + span;
+                }
+            }
             if Z == 0 {
                 let whole = t.to_bits() == from.to_bits() && target.to_bits() == to.to_bits();
                 let span = (t, target, if whole { self.interval } else { target - t });
