@@ -95,13 +95,32 @@ pub struct LinearSteps<const N: usize> {
     parts: u64,
     h: f64,
     points: Vec<Point<N>>,
+    /// Coefficients of the powers of `A h` at each point
+    series: Vec<[Terms; NODES + 1]>,
+}
+
+/// Of one power at one point: exponential, its integral, integrals over the Legendre polynomials of each node.
+#[derive(Clone, Copy, Debug)]
+struct Terms {
+    carry: f64,
+    all: f64,
+    weights: [f64; NODES],
+}
+
+impl Terms {
+    fn new(point: usize, k: usize) -> Self {
+        let c = NODE.get(point).copied().unwrap_or(1.0);
+        let weights = std::array::from_fn(|j| weight(j, c, k));
+        Self { carry: inverse_factorial(c, k), all: inverse_factorial(c, k + 1), weights }
+    }
 }
 
 impl<const N: usize> Default for LinearSteps<N> {
     fn default() -> Self {
         let zero = [[0.0; N]; N];
+        let series = (0..TERMS).map(|k| std::array::from_fn(|point| Terms::new(point, k))).collect();
         let point = Point { carry: zero, weights: [zero; NODES], all: zero, turn: [[0.0; N]; 2] };
-        Self { key: None, parts: 1, h: 0.0, points: vec![point; NODES + 1] }
+        Self { key: None, parts: 1, h: 0.0, points: vec![point; NODES + 1], series }
     }
 }
 
@@ -245,17 +264,15 @@ impl<const N: usize> LinearSteps<N> {
                 turn: columns,
             };
         }
-        for k in 0..TERMS {
-            for (i, point) in self.points.iter_mut().enumerate() {
-                let c = NODE.get(i).copied().unwrap_or(1.0);
-                let term = inverse_factorial(c, k);
-                add(&mut point.carry, term, &power);
+        for terms in &self.series {
+            for (point, terms) in self.points.iter_mut().zip(terms) {
+                add(&mut point.carry, terms.carry, &power);
                 for side in 0..2 {
-                    (0..N).for_each(|n| point.turn[side][n] += term * columns[side][n]);
+                    (0..N).for_each(|n| point.turn[side][n] += terms.carry * columns[side][n]);
                 }
-                add(&mut point.all, h * inverse_factorial(c, k + 1), &power);
-                for j in 0..NODES {
-                    add(&mut point.weights[j], h * weight(j, c, k), &power);
+                add(&mut point.all, h * terms.all, &power);
+                for (weights, term) in point.weights.iter_mut().zip(terms.weights) {
+                    add(weights, h * term, &power);
                 }
             }
             // [A c; 0 R]^(k+1) = [A^(k+1), A columns + c row; 0, R^(k+1)]
