@@ -63,9 +63,19 @@ impl Variable {
         if self.kind == Kind::Enumeration {
             return self.items.iter().any(|(_, item)| *item as f64 == value);
         }
+        if self.is_switch() {
+            return value == 0.0 || value == 1.0;
+        }
         value.is_finite()
             && self.min.is_none_or(|min| value >= min)
             && self.max.is_none_or(|max| value <= max)
+    }
+
+    /// A discrete number from 0 to 1 is a switch: inputs are Float64 for all hosts, Boolean ones too.
+    #[allow(clippy::float_cmp, reason = "as declared")]
+    fn is_switch(&self) -> bool {
+        let discrete = self.causality == Causality::Input && !self.continuous;
+        discrete && self.min == Some(0.0) && self.max == Some(1.0)
     }
 }
 
