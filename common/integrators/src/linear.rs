@@ -9,7 +9,7 @@
 //! ```
 //! `c_j`, `w_j` are the six nodes and weights of Gauss on [0, 1], `P_m` the Legendre polynomials there: six values of `b`
 //! give its polynomial. Integrals `q` of the solution (work, heat) have no influence on it and are summed up along it; a
-//! step is divided so that the fastest mode turns by at most one radian in each part, where that sum is exact to rounding.
+//! step is divided so that the fastest mode turns by at most one radian in each part, where that sum is right to 1e-12.
 //!
 //! Sources: Hochbruck & Ostermann, Acta Numerica 19 (2010) (exponential collocation); Van Loan, IEEE Trans. Autom. Control
 //! 23 (1978) (integrals from the exponential of a larger matrix).

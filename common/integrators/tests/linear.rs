@@ -153,7 +153,9 @@ proptest! {
         let (mut x, mut statistics) = (start, Statistics::default());
         Solver::new(settings).unwrap().advance(&mass, 0.0, 1.0, &mut x, &mut statistics).unwrap();
         for n in 0..3 {
-            prop_assert!((found[n] - x[n]).abs() < 2e-12 * (1.0 + x[n].abs()), "{n}: {} {}", found[n], x[n]);
+            // Gauss on a square that turns by two radians: (6!)^4 / (13 (12!)^3) 2^12 = 8e-13 of a power of some tens of W
+            let tolerance = if n == 2 { 5e-11 } else { 2e-12 };
+            prop_assert!((found[n] - x[n]).abs() < tolerance * (1.0 + x[n].abs()), "{n}: {} {}", found[n], x[n]);
         }
     }
 }
