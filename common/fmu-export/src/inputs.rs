@@ -12,7 +12,9 @@ mod polynomials;
 #[cfg(test)]
 mod tests;
 
-use model::{Enumeration, ParameterError, Variables};
+use model::{Enumeration, ParameterError, Variability, Variables};
+
+use crate::Variable;
 
 pub use history::History;
 pub use polynomials::{Polynomials, Span};
@@ -112,8 +114,16 @@ pub struct Channels {
 }
 
 impl Channels {
+    /// Of the inputs among the variables of an FMU.
+    #[must_use]
+    pub fn of(inputs: &[Variable]) -> Self {
+        Self::new(inputs.iter().map(|Variable { name, entry: e, .. }| {
+            (name.as_str(), e.variability == Variability::Continuous, e.min, e.max, e.nominal)
+        }))
+    }
+
     /// From name, continuity, smallest, largest and nominal value of each input.
-    pub fn new<'a>(inputs: impl Iterator<Item = (&'a str, bool, f64, f64, f64)>) -> Self {
+    pub(crate) fn new<'a>(inputs: impl Iterator<Item = (&'a str, bool, f64, f64, f64)>) -> Self {
         let inputs: Vec<_> = inputs.collect();
         let find = |name: &str| inputs.iter().position(|i| i.0 == name && i.1);
         let mut motions = Vec::new();

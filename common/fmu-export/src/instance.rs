@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use integrators::{Method, Solver, Statistics};
-use model::{Kind, Model, ParameterError, Variability, Variables};
+use model::{Kind, Model, ParameterError, Variables};
 use num_dual::Dual64;
 
 use crate::built::Built;
@@ -50,11 +50,7 @@ impl<M: Model> Instance<M> {
     pub fn with_interface(interface: Interface) -> Self {
         let table = Table::shared::<M>();
         let state = State::new(&table, interface);
-        let channels = Channels::new(table.variables[Layout::<M>::INPUTS].iter().map(|v| {
-            let e = &v.entry;
-            let continuous = e.variability == Variability::Continuous;
-            (v.name.as_str(), continuous, e.min, e.max, e.nominal)
-        }));
+        let channels = Channels::of(&table.variables[Layout::<M>::INPUTS]);
         Self {
             duals: vec![Dual64::from_re(0.0); table.variables.len()],
             dual_states: Vec::new(),

@@ -443,11 +443,11 @@ impl Sweeper {
         result
     }
 
-    /// Distance at each closing joint [m], over the directions in which it is closed, in the order of the scene.
+    /// Distance at a closing joint [m], over the directions in which it is closed.
     #[must_use]
-    pub fn distances(&self, joints: &[crate::scene::Joint]) -> Vec<f64> {
+    pub fn distance(&self, joint: &crate::scene::Joint) -> f64 {
         let square = |axis: &Axis| (self.values[axis.r[0]] - self.values[axis.r[1]]).powi(2);
-        joints.iter().map(|joint| joint.axes.iter().map(square).sum::<f64>().sqrt()).collect()
+        joint.axes.iter().map(square).sum::<f64>().sqrt()
     }
 
     /// Largest distance and relative velocity of the closing joints, and where [m, m/s].

@@ -88,7 +88,7 @@ pub use dynamic::{DynamicOde, ExplicitSolver, ExplicitState, NotExplicit};
 pub use error::{SettingsError, StepError};
 pub use events::{Crossing, Indicators, Reached};
 pub use exact::Transition;
-pub use linear::{Harmonic, LinearOde, LinearSteps};
+pub use linear::{LinearForm, LinearSteps};
 pub use method::Method;
 pub use ode::{Jacobian, Ode};
 pub use run::MAX_EVALUATIONS;

@@ -8,7 +8,7 @@ use fmu_export::{
     CreationError, Event, Exported, Fault, Interface, Phase, Rule, SolverCounters, SolverParameters, Status,
     times,
 };
-use model::{Kind, Variability, Variables};
+use model::{Kind, Variables};
 
 use super::layout::Layout;
 use super::state::{Backup, Flags};
@@ -76,11 +76,7 @@ pub(super) fn load(resources: &Path) -> Result<Loaded, AssemblyError> {
 impl Assembly {
     fn of(loaded: Loaded, interface: Interface) -> Self {
         let Loaded { scene, config, layout, sweeper } = loaded;
-        let variables = &layout.table.variables()[layout.inputs.clone()];
-        let channels = Channels::new(variables.iter().map(|v| {
-            let e = &v.entry;
-            (v.name.as_str(), e.variability == Variability::Continuous, e.min, e.max, e.nominal)
-        }));
+        let channels = Channels::of(&layout.table.variables()[layout.inputs.clone()]);
         let mut assembly = Self {
             polynomials: Polynomials::new(&channels),
             channels,

@@ -15,7 +15,6 @@ use fmu_export::inputs::{PortParameters, PortReset};
 use fmu_export::{
     SolverCounters, SolverMethod, SolverParameters, TIME, Table, Variable, interned, port_parts,
 };
-use integrators::Method;
 use model::{Causality, Entry, EnumType, Initial, Kind, Variability, Variables};
 
 use super::AssemblyError;
@@ -77,21 +76,6 @@ fn without_slot(port: &str) -> &str {
     port.find(".slot[").map_or(port, |at| &port[..at])
 }
 
-/// Number of a method in `solver.method`.
-#[allow(clippy::cast_precision_loss, reason = "small numbers")]
-fn method_number(method: Method) -> f64 {
-    let method = match method {
-        Method::Heun => SolverMethod::Heun,
-        Method::Rk4 => SolverMethod::Rk4,
-        Method::Dopri5 => SolverMethod::Dopri5,
-        Method::Dop853 => SolverMethod::Dop853,
-        Method::Rodas4 => SolverMethod::Rodas4,
-        Method::Radau5 => SolverMethod::Radau5,
-        Method::Exact => SolverMethod::Exact,
-    };
-    method as i64 as f64
-}
-
 impl Layout {
     /// The variables of a scene whose instances have their parameters and are not initialised; `step` is the start value
     /// of `solver.step` where the scene has none.
@@ -107,8 +91,9 @@ impl Layout {
         let outer = Outer::of(scene);
         let mut builder = Builder { scene, variables: Vec::new(), places: Vec::new(), types: HashMap::new() };
         builder.own(&[TIME], &[]);
-        let starts =
-            [method_number(config.integrator), config.step.unwrap_or(step), config.rtol, config.atol];
+        #[allow(clippy::cast_precision_loss, reason = "a small number")]
+        let method = SolverMethod::from(config.integrator) as i64 as f64;
+        let starts = [method, config.step.unwrap_or(step), config.rtol, config.atol];
         let solver = builder.own(<SolverParameters as Variables<f64>>::TABLE, &starts);
         let treated = !outer.inputs.is_empty();
         let on = |table: &'static [Entry]| if treated { table } else { &[] };

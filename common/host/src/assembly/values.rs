@@ -44,7 +44,7 @@ impl Assembly {
         match self.layout.places[i] {
             Place::Own => Ok(self.values[i]),
             Place::Input(input) => Ok(self.inputs[input]),
-            Place::Gap(joint) => Ok(self.sweeper.distances(&self.scene.network.joints)[joint]),
+            Place::Gap(joint) => Ok(self.sweeper.distance(&self.scene.network.joints[joint])),
             Place::Element { node, reference, kind } => self.sweeper.instances[node]
                 .get_number(kind, reference)
                 .map_err(|fault| refused(self.sweeper.failed(node, fault))),
