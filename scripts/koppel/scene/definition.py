@@ -115,7 +115,7 @@ class Scene:
 
     def __init__(self, name: str, fmus=None):
         self.name = name
-        self._fmus = fmus
+        self.fmus = fmus
         self._opened: dict[Path, Fmu] = {}
         self.components: dict[str, Component] = {}
         self.connections: list[Connection] = []
@@ -175,11 +175,11 @@ class Scene:
     def _open(self, fmu) -> Fmu:
         if isinstance(fmu, Fmu):
             return fmu
-        if callable(self._fmus) and isinstance(fmu, str):
-            return self._fmus(fmu)
+        if callable(self.fmus) and isinstance(fmu, str):
+            return self.fmus(fmu)
         path = Path(fmu)
         if path.suffix != ".fmu":
-            path = (Path(self._fmus) if self._fmus else paths.DIST / "fmi3") / f"{fmu}.fmu"
+            path = (Path(self.fmus) if self.fmus else paths.DIST / "fmi3") / f"{fmu}.fmu"
         path = path.resolve()
         if path not in self._opened:
             if not path.is_file():

@@ -82,6 +82,10 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
                 let span = driven.choose_method(t, &x, &mut solver);
                 if span < 0.75 * (target - t) {
                     target = t + span;
+                    if target <= t {
+                        // below the resolution of time
+                        return Err(fault(StepError::TooMuchWork { t, t_end: to, h: span }));
+                    }
                 }
             }
             if Z == 0 {
