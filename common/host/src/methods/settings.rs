@@ -173,6 +173,10 @@ impl Config {
             let wanted = "it must be 0, 1 or 2".into();
             return Err(SceneError::Setting { name: "order", value: self.order.to_string(), wanted });
         }
+        if self.method == MethodKind::CsPece && self.order == 0 {
+            let wanted = "cs-pece has k = 1 or 2".into();
+            return Err(SceneError::Setting { name: "order", value: self.order.to_string(), wanted });
+        }
         if self.method != MethodKind::CsPece && self.is_fixed_step() && self.step.is_none() {
             return Err(SceneError::MissingSetting { name: "the step", option: "--H" });
         }

@@ -78,7 +78,7 @@ fn ranges(lengths: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
 impl Run {
     /// Begins a run; the FMUs have been initialised.
     pub(crate) fn start(sweeper: &mut Sweeper, config: &Config) -> Result<Self, Error> {
-        let happened = events::update(sweeper)?;
+        let happened = events::update(sweeper, false)?;
         sweeper.each(|_, instance| instance.enter_continuous_time_mode())?;
         let mut run = Self::of(sweeper, config)?;
         run.next_event = happened.next;
@@ -336,7 +336,7 @@ impl Run {
 
     /// Carries out the event and goes on with Continuous-Time Mode.
     pub(crate) fn leave_event_mode(&mut self, sweeper: &mut Sweeper) -> Result<(), Error> {
-        let happened = events::update(sweeper)?;
+        let happened = events::update(sweeper, false)?;
         // states may have jumped: all signals once more
         sweeper.sweep()?;
         sweeper.each(|_, instance| instance.enter_continuous_time_mode())?;
