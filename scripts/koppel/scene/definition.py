@@ -20,7 +20,7 @@ from .errors import SceneError, near
 from .ports import AXES, Port
 
 METHODS = ("common", "cs-predict", "cs-pece", "jacobi", "seidel")
-INTEGRATORS = ("heun", "rk4", "dopri5", "dop853")
+INTEGRATORS = ("heun", "rk4", "dopri5", "dop853", "rodas4", "radau5")
 FIXED_STEP = ("heun", "rk4")
 
 #: A variable of a component: (component, variable).

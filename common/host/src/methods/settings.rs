@@ -32,11 +32,13 @@ const METHODS: [(&str, MethodKind); 5] = [
 ];
 
 /// Names of the integrators of method `common`.
-const INTEGRATORS: [(&str, Integrator); 4] = [
+const INTEGRATORS: [(&str, Integrator); 6] = [
     ("heun", Integrator::Heun),
     ("rk4", Integrator::Rk4),
     ("dopri5", Integrator::Dopri5),
     ("dop853", Integrator::Dop853),
+    ("rodas4", Integrator::Rodas4),
+    ("radau5", Integrator::Radau5),
 ];
 
 impl MethodKind {

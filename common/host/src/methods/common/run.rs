@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use integrators::{DynamicOde, ExplicitSolver, ExplicitState, Settings, Statistics};
+use integrators::{DynamicOde, DynamicSolver, DynamicState, Settings, Statistics};
 use serde::{Deserialize, Serialize};
 
 use super::{Whole, integrator, refused};
@@ -28,7 +28,7 @@ struct Ahead {
 /// A run between two steps of the integrator.
 pub(crate) struct Run {
     ranges: Vec<Range<usize>>,
-    pub(super) solver: ExplicitSolver,
+    pub(super) solver: DynamicSolver,
     /// How far the steps count [s]
     pub(crate) t: f64,
     x: Vec<f64>,
@@ -61,7 +61,7 @@ pub(crate) struct RunState {
     grid: u64,
     events: u64,
     ahead: Option<Ahead>,
-    solver: ExplicitState,
+    solver: DynamicState,
 }
 
 /// Consecutive ranges of given lengths.
@@ -121,7 +121,7 @@ impl Run {
             atol: config.atol,
         };
         Ok(Self {
-            solver: ExplicitSolver::new(settings, nominal).map_err(refused)?,
+            solver: DynamicSolver::new(settings, nominal).map_err(refused)?,
             before: sweeper.values.clone(),
             ranges: state_ranges,
             t: config.start,
@@ -187,7 +187,7 @@ impl Run {
 
     /// Counters of the integrator.
     pub(crate) fn statistics(&self) -> Statistics {
-        self.solver.statistics
+        self.solver.statistics()
     }
 
     /// How far the equations are solved, whether the last step counts or not [s].
@@ -341,7 +341,8 @@ impl Run {
         sweeper.sweep()?;
         sweeper.each(|_, instance| instance.enter_continuous_time_mode())?;
         self.next_event = happened.next;
-        let jumped = self.before.iter().zip(&sweeper.values).any(|(a, b)| a.to_bits() != b.to_bits());
+        // a zero that changes its sign is no jump
+        let jumped = self.before.iter().zip(&sweeper.values).any(|(a, b)| (a - b).abs() > 0.0);
         if happened.states_changed {
             Whole { sweeper, ranges: &self.ranges }.fetch(&mut self.x)?;
         }
