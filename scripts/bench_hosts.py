@@ -50,7 +50,8 @@ int fmi3DoStep(void *i, double t, double h, _Bool p, _Bool *e, _Bool *x, _Bool *
     (void)i; (void)p; *e = *x = *r = 0; *last = t + h; return 0;
 }
 """
-SILENT = ("EnterInitializationMode", "ExitInitializationMode", "Terminate", "Reset", "SetInt32", "SetInt64", "SetBoolean")
+SILENT = ("EnterInitializationMode", "ExitInitializationMode", "Terminate", "Reset")
+SILENT += ("SetInt32", "SetInt64", "SetBoolean")
 
 
 def error(end) -> float:
@@ -206,7 +207,8 @@ def main():
             for H in STEPS:
                 seconds, wrong = measure(H)
                 each = seconds / (FMUS * round(STOP / H)) * 1e6
-                print(f"{name:<22}{H:>10g}{each:>22.3f}{'-' if wrong is None else format(wrong, '.2e'):>15}", flush=True)
+                beside = "-" if wrong is None else f"{wrong:.2e}"
+                print(f"{name:<22}{H:>10g}{each:>22.3f}{beside:>15}", flush=True)
 
 
 if __name__ == "__main__":

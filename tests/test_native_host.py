@@ -127,7 +127,8 @@ def same_counts(cost, twin):
 def controlled(fmu, tmp_path, name, k, rtol, settings, *options):
     """cs-pece without H by both hosts, the bump of the wishbone's load with time events inside steps."""
     scene = library.scene(name, fmu)
-    inner = ["--set", "*.solver.method=dopri5", "--set", "*.solver.rtol=1e-10", "--set", f"*.solver.atol={scenes.atol_of(1e-10)}"]
+    inner = ["--set", "*.solver.method=dopri5", "--set", "*.solver.rtol=1e-10"]
+    inner += ["--set", f"*.solver.atol={scenes.atol_of(1e-10)}"]
     if name == "double_wishbone":
         scene.set("load", **BUMP)
         inner += [part for item in BUMP.items() for part in ("--set", "load.{}={}".format(*item))]
@@ -221,7 +222,8 @@ def bushed(fmu, tmp_path):
 def implicit(scene, folder, tmp_path, integrator, settings, *options):
     """A run of method common by both hosts: the steps of the program's."""
     twin = scene.run(method="common", integrator=integrator, **settings)
-    command = ["--integrator", integrator, *(part for key, value in settings.items() for part in (f"--{key}", str(value)))]
+    command = ["--integrator", integrator]
+    command += [part for key, value in settings.items() for part in (f"--{key}", str(value))]
     result, cost = counted(tmp_path, folder, "--method", "common", *command, *options)
     same(result, twin)
     steps = cost["steps"]

@@ -21,7 +21,8 @@ class Response:
         self.active = False
         self._inputs, self._outputs = network.inputs_of(name), network.outputs_of(name)
         #: By input: the outputs that depend on it.
-        self._dependent = [[i for i, o in enumerate(self._outputs) if ref in network.depends(o)] for ref in self._inputs]
+        on = [network.depends(output) for output in self._outputs]
+        self._dependent = [[row for row, known in enumerate(on) if ref in known] for ref in self._inputs]
         fmu = network.scene.components[name].fmu
         if any(self._dependent) and not fmu.capability("providesDirectionalDerivatives"):
             raise SceneError(

@@ -222,7 +222,7 @@ class Radau5:
             self._prepare(f, start, h, norm)
             solved = self._newton(f, start, h, norm, guess)
         if solved is None:
-            raise NotSolved(f"the equations of an implicit step of {h:.3e} s at t = {start.t:.6f} s could not be solved")
+            raise NotSolved(f"the equations of an implicit step of {h:.3e} s at t = {start.t:.6f} s are not solved")
         return solved
 
     def _newton(self, f: Rates, start: Start, h: float, norm: Norm, z: np.ndarray) -> tuple[np.ndarray, int] | None:
