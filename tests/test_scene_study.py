@@ -18,6 +18,13 @@ def test_no_scene_is_worse_than_kept(fmu, name):
     assert study.worse(old, study.regression(scene_study.kept(name, fmu))) == []
 
 
+@pytest.mark.parametrize("name", library.SCENES)
+def test_no_scene_is_worse_than_kept_in_the_program(name):
+    """The same for `koppel study`, all methods with fixed steps."""
+    old = json.loads((scene_study.REGRESSION / "native" / f"{name}.json").read_text(encoding="utf-8"))
+    assert study.worse(old, study.regression(scene_study.kept_native(name))) == []
+
+
 KEPT = {
     "rk4": {
         "order": 4.0,

@@ -20,7 +20,7 @@ from .errors import SceneError, near
 from .ports import AXES, Port
 
 METHODS = ("common", "cs-predict", "cs-pece", "jacobi", "seidel")
-INTEGRATORS = ("heun", "rk4", "dopri5", "dop853")
+INTEGRATORS = ("heun", "rk4", "dopri5", "dop853", "rodas4", "radau5")
 FIXED_STEP = ("heun", "rk4")
 
 #: A variable of a component: (component, variable).
@@ -80,11 +80,11 @@ class Settings:
     #: Step of a fixed-step integrator [s].
     step: float | None = None
     rtol: float = 1e-6
-    #: Times the nominal value of each state or exchanged value.
+    #: Method common: times the nominal value of each state; cs-pece: of positions and velocities [m, m/s].
     atol: float = 1e-9
     #: Degree of the extrapolated inputs; k of pece.
     order: int = 1
-    #: Communication step [s].
+    #: Communication step [s]; None: that of cs-pece follows the error.
     H: float | None = None
     #: Stabilisation of closing joints [1/s].
     alpha: float = 2.0
