@@ -57,16 +57,16 @@ pub struct Friction {
 
 /// Friction of one axis at a moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Rubbing<S> {
+pub(super) struct Rubbing<S> {
     /// Against the motion [N]
-    pub(crate) F: S,
+    pub(super) F: S,
     /// Rate of the bristle's deflection [m/s]
-    pub(crate) z_dot: S,
+    pub(super) z_dot: S,
 }
 
 impl Friction {
     /// The parameters, if they fit together.
-    pub(crate) fn checked(&self) -> Result<Self, ParameterError> {
+    pub(super) fn checked(&self) -> Result<Self, ParameterError> {
         if self.F_s < self.F_c {
             let reason = format!("below the Coulomb friction friction.F_c = {}", self.F_c);
             let allowed = format!(">= {} N", self.F_c);
@@ -82,7 +82,7 @@ impl Friction {
 
     /// Friction at the velocity `v` with bristles deflected by `z` (8).
     #[inline]
-    pub(crate) fn at<S: Scalar>(&self, v: S, z: S) -> Rubbing<S> {
+    pub(super) fn at<S: Scalar>(&self, v: S, z: S) -> Rubbing<S> {
         let still = S::lift(0.0);
         let viscous = v * self.s2;
         let g = || Self::bell(v, self.v_s) * (self.F_s - self.F_c) + self.F_c;

@@ -3,13 +3,13 @@
 //! Source: the EFFI specification. The published abstract gives no equations; these are a design from standard models.
 
 mod arm;
-mod arm_variables;
+pub mod arm_variables;
 mod controller;
-mod controller_variables;
+pub mod controller_variables;
 pub mod device;
 mod drawer;
 pub mod fourbar;
-mod friction;
+pub mod friction;
 mod mechanism;
 pub mod mechanism_variables;
 mod plant;
