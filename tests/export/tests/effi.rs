@@ -190,11 +190,9 @@ fn a_command_that_overflows_is_a_fault() {
 #[test]
 fn a_saved_controller_goes_on_to_the_last_bit() {
     let mut fmu = started::<Controller>(Interface::CoSimulation, &[("delay", 3.0), ("ki", 100.0)]);
-    let mut t = 0.0_f64;
-    let mut drive = |fmu: &mut Named<Controller>| {
+    let drive = |fmu: &mut Named<Controller>| {
         let mut seen = vec![];
         for _ in 0..20 {
-            t += 4e-4;
             let l = length(0.6 + 0.01 * (30.0 * fmu.instance.time()).sin());
             hold(fmu, [("axis[1].position", l), ("axis[2].position", l), ("sensor.F.z", l)]);
             fmu.step(4e-4).expect("a step");
@@ -364,12 +362,10 @@ fn stiff_bristles_need_an_implicit_method() {
 fn a_released_grip_gives_no_impulse() {
     for interface in [Interface::CoSimulation, EVENTS] {
         let mut fmu = started::<Arm>(interface, &[("H.r.z", 0.57), ("port.inputs", 1.0)]);
-        let mut step = |fmu: &mut Named<Arm>, enabled: f64| {
+        let step = |fmu: &mut Named<Arm>, enabled: f64| {
+            fmu.set("grip.enabled", enabled).expect("0 or 1");
             if interface == EVENTS {
-                fmu.set("grip.enabled", enabled).expect("0 or 1");
                 fmu.pass_event_mode(interface).expect("Step Mode");
-            } else {
-                fmu.set("grip.enabled", enabled).expect("0 or 1");
             }
             fmu.step(1e-3).expect("a step");
             if interface == EVENTS {

@@ -79,7 +79,8 @@ impl Arm {
 
 impl Model for Arm {
     const NAME: &'static str = "operator_arm";
-    const DESCRIPTION: &'static str = "Hand and arm of an operator who holds a handle and moves it by intention";
+    const DESCRIPTION: &'static str =
+        "Hand and arm of an operator who holds a handle and moves it by intention";
     const EXPERIMENT: Experiment = Experiment { stop: 1.0, step: 0.001 };
     const DOCUMENTATION: Documentation = model::documentation!(
         "operator_arm",

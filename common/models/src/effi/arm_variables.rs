@@ -82,16 +82,8 @@ pub struct Inputs<S> {
 
 /// The grip, by component.
 const GRIP: &[&str] = &["H.r.@", "H.v.@", "hand.r.@", "hand.v.@", "grip.enabled"];
-const HAND: &[&str] = &[
-    "H.r.@",
-    "H.v.@",
-    "hand.r.@",
-    "hand.v.@",
-    "grip.enabled",
-    "intent.r.@",
-    "intent.v.@",
-    "voluntary.F.@",
-];
+const HAND: &[&str] =
+    &["H.r.@", "H.v.@", "hand.r.@", "hand.v.@", "grip.enabled", "intent.r.@", "intent.v.@", "voluntary.F.@"];
 
 /// Motion of the hand.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
