@@ -3,9 +3,10 @@
 
     scripts/build rvdp_absorber && .venv/bin/python scripts/bench_absorber.py [--quick]
 
-The absorber starts at half its amplitude and synchronises with the design force of f = 0.4, alpha = 1.2 over two seconds, in
-communication steps of 0.1 s. Error: of x over all samples, relative to X, against radau5 at rtol 1e-13, which another method at 1e-13
-confirms to the figure in the second table. CPU time: of the doStep loop, smallest of three. out/absorber/work_precision.csv and .png.
+The absorber starts at half its amplitude and synchronises with the design force of f = 0.4, alpha = 1.2 over two
+seconds, in communication steps of 0.1 s. Error: of x over all samples, relative to X, against radau5 at rtol 1e-13, which
+another method confirms to the figure printed above each gain. CPU time: of the doStep loop, smallest of three.
+out/absorber/work_precision.csv and .png.
 """
 
 import argparse
@@ -75,7 +76,9 @@ def draw(rows, path):
     from matplotlib import pyplot
 
     gains = sorted({row[0] for row in rows})
-    figure, all_axes = pyplot.subplots(1, len(gains), figsize=(3.2 * len(gains), 3.6), layout="constrained", sharey=True)
+    figure, all_axes = pyplot.subplots(
+        1, len(gains), figsize=(3.2 * len(gains), 3.6), layout="constrained", sharey=True
+    )
     for axes, gain in zip(np.atleast_1d(all_axes), gains):
         for method in (*METHODS, "rk4"):
             found = [(row[4], row[3]) for row in rows if row[0] == gain and row[1] == method and row[3]]

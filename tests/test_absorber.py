@@ -1,4 +1,5 @@
-"""`rvdp_absorber` through the packed FMU against `tests/reference/absorber` (quad-precision solutions) and closed forms."""
+"""`rvdp_absorber` through the packed FMU against `tests/reference/absorber` (quad-precision solutions) and closed
+forms."""
 
 import json
 from functools import partial
@@ -30,7 +31,8 @@ def solver(method, rtol, atol=None):
 
 
 def follow(fmu, name, settings, split=1):
-    """Largest error of each column relative to its peak, and the run, at the samples of the reference or finer steps."""
+    """Largest error of each column relative to its peak, and the run, at the samples of the reference or finer
+    steps."""
     t, columns = table(name)
     result = fmu("rvdp_absorber").run(
         {**parameters(name), **settings}, H=(t[1] - t[0]) / split, stop=t[-1], outputs=list(columns)
@@ -45,7 +47,8 @@ CORE = ["free_limit_cycle", "driven_paper", "n_far", "huge_start", "tiny_energy"
 
 
 #: dP.F/dw relative to the peaks: the force is a steep function of the velocity where control is strong, so that the
-#: limits for the states leave more for the force. n_far: m gamma/2 (3 w^2 + ..) 30 m/s / 2010 N = 6200 at most; measured 52.
+#: limits for the states leave more for the force. n_far: m gamma/2 (3 w^2 + ..) 30 m/s / 2010 N = 6200 at most;
+#: measured 52.
 STEEP = {"n_far": 100.0}
 
 
@@ -88,7 +91,9 @@ def test_synchronised_motion_is_harmonic(fmu, gain):
     start = {"control.gamma": gamma, "control.force": force, "control.alpha": alpha, "x.start": 0.5 * X}
     drive = {"drive.amplitude": force, "drive.phase": alpha}
     stop = 40.0 if gain < 100.0 else 120.0  # g = 1e3: 0.914 per half period is left
-    result = fmu("rvdp_absorber").run({**start, **drive, **solver("auto", 1e-12, 1e-15)}, H=0.01, stop=stop, outputs=["x"])
+    result = fmu("rvdp_absorber").run(
+        {**start, **drive, **solver("auto", 1e-12, 1e-15)}, H=0.01, stop=stop, outputs=["x"]
+    )
     late = result.t > stop - 2.0
     error = np.abs(result["x"] - X * np.sin(OMEGA * result.t))[late].max()
     assert error <= 1e-10 * X, error / X
@@ -130,7 +135,7 @@ def coupled(fmu, name, **how):
     scene.set("primary", **case["primary_oscillator"])
     scene.set("absorber", **case["rvdp_absorber"])
     result = scene.run(stop=t[-1], interval=t[1] - t[0], **how)
-    pairs = [(f"{part}.{c}", v) for c, v in columns.items() for part in ("primary", "absorber")]
+    pairs = [(f"{part}{c}", v) for c, v in columns.items() for part in ("", "primary.", "absorber.")]
     return max(np.abs(result[n] - v).max() / np.abs(v).max() for n, v in pairs if n in result)
 
 
@@ -203,9 +208,7 @@ def shaken(fmu, settings, spatial=False, stop=3.0, outputs=("x", "w")):
     H = 2e-3
     feed = {"port.inputs": "endpoint", "port.order": 3}
     start = {**dict(zip(names, law(0.0))), **feed, "port.kind": "spatial" if spatial else "scalar", **settings}
-    return fmu("rvdp_absorber").run(
-        start, H=H, stop=stop, outputs=list(outputs), inputs=(names, lambda t: law(t + H))
-    )
+    return fmu("rvdp_absorber").run(start, H=H, stop=stop, outputs=list(outputs), inputs=(names, lambda t: law(t + H)))
 
 
 EVERYTHING = {

@@ -3,6 +3,7 @@ would make it."""
 
 import zipfile
 
+import closed_forms
 import numpy as np
 import pytest
 from koppel import Reference, Result, paths
@@ -192,16 +193,10 @@ def test_bushing(packed):
 def test_primary_oscillator(packed):
     """Matrix exponential of mass, spring, damper and a sine as two more states, with the powers integrated by scipy."""
     result = packed("primary_oscillator")
-    m, k, c, F, w = 100.0, 15791.367041742973, 25.132741228718345, 50.0, 4.0 * np.pi
+    m, k, c, F, w = closed_forms.M, closed_forms.K, closed_forms.C, closed_forms.F, closed_forms.OMEGA
     t = result.t
-    # particular solution in resonance (k = m w^2): -F/(c w) cos(w t), and the decay that starts it from rest
     assert k == pytest.approx(m * w * w, rel=1e-14)
-    delta = c / (2.0 * m)
-    nu = np.sqrt(k / m - delta**2)
-    decay = np.exp(-delta * t)
-    X = F / (c * w)
-    s = X * (decay * (np.cos(nu * t) + delta / nu * np.sin(nu * t)) - np.cos(w * t))
-    v = X * (w * np.sin(w * t) - decay * (k / m) / nu * np.sin(nu * t))
+    s, v = closed_forms.resonance(t)
     a = (F * np.sin(w * t) - c * v - k * s) / m
     expected = {"s[1]": s, "v[1]": v, "P.s": s, "P.v": v, "P.a": a, "drive.omega": w}
     expected |= {"energy.kinetic": 0.5 * m * v * v, "energy.potential": 0.5 * k * s * s}
@@ -210,7 +205,7 @@ def test_primary_oscillator(packed):
     balance = result["energy.supplied"] - result["energy.dissipated"] - expected["energy.kinetic"]
     assert np.abs(balance - expected["energy.potential"]).max() <= 1e-9 * result["energy.supplied"][-1]
     at = np.linspace(0.0, 10.0, 200_001)
-    fine = X * (w * np.sin(w * at) - np.exp(-delta * at) * (k / m) / nu * np.sin(nu * at))
+    _, fine = closed_forms.resonance(at)
     heat = np.trapezoid(c * fine * fine, at)
     assert result["energy.dissipated"][-1] == pytest.approx(heat, rel=1e-7)
 

@@ -1,6 +1,7 @@
-"""What calms a structure: Rayleigh-van-der-Pol absorber, passive absorbers and none, by the scene `absorber_on_oscillator`.
+"""What calms a structure: Rayleigh-van-der-Pol absorber, passive absorbers and none, by the scene
+`absorber_on_oscillator`.
 
-python -m koppel.absorber    docs/absorber_detuning.png, out/absorber/{cases,detuning}.csv, the table of cases on the screen
+python -m koppel.absorber    docs/absorber_detuning.png, out/absorber/{cases,detuning}.csv, the table of cases
 """
 
 import csv
@@ -23,8 +24,8 @@ KINDS: dict[str, str | None] = {"none": None, "passive": "passive", "den_hartog"
 class Measured:
     """Over the last periods."""
 
-    #: Largest displacement of the structure, and its part at the drive's frequency [m]; off the design point they differ where
-    #: the motion has two frequencies
+    #: Largest displacement of the structure, and its part at the drive's frequency [m]; off the design point they
+    #: differ where the motion has two frequencies
     amplitude: float
     harmonic: float
     #: Root mean square of the controlled force [N] and mean power of the controller [W]
@@ -80,10 +81,13 @@ def case(drive: dict, own: dict, fmus=None) -> dict[str, Measured]:
 
 
 def detuning(ratios, fmus=None) -> dict[str, list[float]]:
-    """Amplitudes of the structure over the drive's frequency relative to the design; `rvdp_told` knows the frequency."""
+    """Amplitudes of the structure over the drive's frequency relative to the design; `rvdp_told` knows the
+    frequency."""
     columns = {kind: [measure(w, r * OMEGA, fmus, **({} if w != "rvdp" else {"told": False})).amplitude for r in ratios]
                for kind, w in KINDS.items()}  # fmt: skip
-    columns["rvdp_told"] = [measure("rvdp", r * OMEGA, fmus, **told({"omega": r * OMEGA}, {})).amplitude for r in ratios]
+    columns["rvdp_told"] = [
+        measure("rvdp", r * OMEGA, fmus, **told({"omega": r * OMEGA}, {})).amplitude for r in ratios
+    ]
     return columns
 
 
@@ -122,7 +126,9 @@ def main():
     """`scripts/absorber`"""
     out = paths.ROOT / "out" / "absorber"
     out.mkdir(parents=True, exist_ok=True)
-    print(f"{'case':26}{'RvdP':>9}{'at omega':>9}{'none':>9}{'passive':>9}{'Hartog':>9}  mm {'F1 rms N':>9}{'mean W':>9}")
+    print(
+        f"{'case':26}{'RvdP':>9}{'at omega':>9}{'none':>9}{'passive':>9}{'Hartog':>9}  mm {'F1 rms N':>9}{'mean W':>9}"
+    )
     rows = []
     for name, drive, own in CASES:
         found = case(drive, own)
@@ -131,8 +137,12 @@ def main():
         row = [*mm, found["rvdp"].force, found["rvdp"].power]
         print(f"{name:26}" + "".join(f"{v:9.4g}" for v in mm) + f"     {row[5]:9.4g}{row[6]:9.4g}", flush=True)
         rows.append([name, *row])
-    _write(out / "cases.csv", ["case", "rvdp_mm", "rvdp_harmonic_mm", "none_mm", "passive_mm", "den_hartog_mm", "force_rms_N", "power_W"], rows)
-    ratios = 1.0 + np.array([-20, -15, -10, -7, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 7, 10, 15, 20]) / 100.0
+    _write(
+        out / "cases.csv",
+        ["case", "rvdp_mm", "rvdp_harmonic_mm", "none_mm", "passive_mm", "den_hartog_mm", "force_rms_N", "power_W"],
+        rows,
+    )
+    ratios = 1.0 + np.array([-20, -10, -5, -3, -1, 0, 1, 3, 5, 10, 20]) / 100.0
     columns = detuning(ratios)
     _write(out / "detuning.csv", ["ratio", *columns], zip(ratios, *columns.values()))
     draw(ratios, columns, paths.ROOT / "docs" / "absorber_detuning.png")

@@ -115,10 +115,12 @@ def absorber_on_oscillator(
     force: float | None = None,
     **values: Value,
 ):
-    """A structure of one or two masses under a harmonic force, and what calms it: `rvdp` (controlled), `passive` (tuned to the
+    """A structure of one or two masses under a harmonic force, and what calms it: `rvdp` (controlled), `passive`
+    (tuned to the
     drive), `den_hartog`, or None.
 
-    `omega`, `force`: of the drive, the absorber is designed for the default ones; `told`: the controller knows the frequency.
+    `omega`, `force`: of the drive, the absorber is designed for the default ones; `told`: the controller knows the
+    frequency.
     `values`: further parameters of the absorber.
     """
     design = _OMEGA if dof == 1 else 15.0

@@ -27,6 +27,28 @@ pub enum SolverMethod {
     Auto = 8,
 }
 
+impl From<Method> for SolverMethod {
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Heun => Self::Heun,
+            Method::Rk4 => Self::Rk4,
+            Method::Dopri5 => Self::Dopri5,
+            Method::Dop853 => Self::Dop853,
+            Method::Rodas4 => Self::Rodas4,
+            Method::Radau5 => Self::Radau5,
+            Method::Exact => Self::Exact,
+        }
+    }
+}
+
+/// Name of a method by its number.
+pub(crate) fn method_name(number: i64) -> &'static str {
+    let Kind::Enumeration(methods) = <SolverMethod as Variables<f64>>::TABLE[0].kind else {
+        return "";
+    };
+    methods.items.iter().find(|i| i.value == number).map_or("unknown", |i| i.name)
+}
+
 /// Solver parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
 #[variables(parameter)]

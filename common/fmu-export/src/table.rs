@@ -10,7 +10,7 @@ use model::{Causality, Entry, Group, Kind, Model, Variability, Variables, count_
 
 use crate::inputs::{PortParameters, PortReset};
 use crate::solver::{AutoCounters, defaults, offers_auto};
-use crate::{SolverCounters, SolverParameters, Standard};
+use crate::{Fault, SolverCounters, SolverParameters, Standard};
 
 /// Where each group of variables of the model `M` lies in the list, fixed at compile time.
 #[derive(Debug)]
@@ -120,7 +120,7 @@ impl Part {
 pub(crate) const ALL_PARTS: u8 = 0x3f;
 
 /// The independent variable.
-pub(crate) const TIME: Entry = {
+pub const TIME: Entry = {
     let mut time = Entry::scalar("time", Kind::Float64);
     time.description = "Simulation time";
     time.unit = "s";
@@ -210,6 +210,48 @@ impl Table {
         table
     }
 
+    /// A table of variables without states; `name` and variables make its token.
+    #[must_use]
+    pub fn of(name: &str, variables: Vec<Variable>) -> Self {
+        let float = |v: &Variable| if v.entry.kind == Kind::Float64 { FLOAT } else { 0 };
+        Self {
+            states: Vec::new(),
+            access: variables.iter().map(float).collect(),
+            affects: vec![0; variables.len()],
+            hash: hash(name, &variables),
+            variables,
+        }
+    }
+
+    /// A variable by its value reference.
+    ///
+    /// # Errors
+    /// [`Fault::UnknownReference`].
+    pub fn variable(&self, reference: u32) -> Result<&Variable, Fault> {
+        self.variables
+            .get(reference as usize)
+            .ok_or(Fault::UnknownReference { reference, count: self.variables.len() })
+    }
+
+    /// A variable of one of the types for which `is` is true; `called` is the type of the call in the `standard`.
+    ///
+    /// # Errors
+    /// [`Fault::UnknownReference`], [`Fault::WrongType`].
+    pub fn typed(
+        &self,
+        reference: u32,
+        standard: Standard,
+        called: &'static str,
+        is: impl Fn(Kind) -> bool,
+    ) -> Result<&Variable, Fault> {
+        let variable = self.variable(reference)?;
+        let (name, kind) = (&variable.name, variable.entry.kind);
+        if is(kind) {
+            return Ok(variable);
+        }
+        Err(Fault::WrongType { variable: name.clone(), reference, is: standard.type_name(kind), called })
+    }
+
     /// The variables in the order of their value references.
     #[must_use]
     pub fn variables(&self) -> &[Variable] {
@@ -223,7 +265,8 @@ impl Table {
     }
 
     /// Start values of all variables.
-    pub(crate) fn start_values(&self) -> Vec<f64> {
+    #[must_use]
+    pub fn start_values(&self) -> Vec<f64> {
         self.variables.iter().map(|v| v.entry.start).collect()
     }
 
@@ -233,7 +276,8 @@ impl Table {
     }
 
     /// Value references of the inputs and states that a variable depends on directly, ascending.
-    pub(crate) fn dependencies(&self, unknown: usize) -> Vec<usize> {
+    #[must_use]
+    pub fn dependencies(&self, unknown: usize) -> Vec<usize> {
         let depends = self.variables[unknown].entry.depends;
         let component = self.variables[unknown].name.rsplit('.').next().unwrap_or_default();
         let covers = |name: &str| {
@@ -260,8 +304,9 @@ impl Table {
             .collect()
     }
 
-    /// [Hash](Self::hash) of the variable table in the form of a GUID.
-    pub(crate) fn token(&self) -> String {
+    /// Hash of the variables in the form of a GUID: changes when the interface changes.
+    #[must_use]
+    pub fn token(&self) -> String {
         guid(self.hash)
     }
 }
@@ -326,7 +371,8 @@ impl Fnv {
 }
 
 /// The allowed values of a variable, for a message.
-pub(crate) fn allowed(entry: &Entry) -> String {
+#[must_use]
+pub fn allowed(entry: &Entry) -> String {
     if let Kind::Enumeration(t) = entry.kind {
         let items: Vec<_> = t.items.iter().map(|i| format!("{} ({})", i.name, i.value)).collect();
         return items.join(", ");

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use integrators::{
-    Complex, MAX_EVALUATIONS, Method, Reached, Solver, Statistics, StepError, largest_stable_step, violates,
+    Complex, MAX_EVALUATIONS, Reached, Solver, Statistics, StepError, largest_stable_step, violates,
 };
 use model::{Model, Spectrum, System, Variables, Visitor, state_jacobian};
 use num_dual::Dual64;
@@ -12,6 +12,7 @@ use super::driven::{Course, Driven, inputs_at};
 use super::linear::{LinearCache, advance};
 use super::{due, not_finite, slack};
 use crate::Fault;
+use crate::solver::{SolverMethod, method_name};
 
 /// One communication step with everything that happens inside it; nothing changes on failure.
 pub(crate) struct Step<'a, M: Model> {
@@ -129,18 +130,9 @@ fn stable(solver: &Solver, (from, to): (f64, f64), eigenvalues: &[Complex]) -> R
     else {
         return Ok(());
     };
-    let method_name = match method {
-        Method::Heun => "heun",
-        Method::Rk4 => "rk4",
-        Method::Dopri5 => "dopri5",
-        Method::Dop853 => "dop853",
-        Method::Rodas4 => "rodas4",
-        Method::Radau5 => "radau5",
-        Method::Exact => "exact",
-    };
     Err(Fault::Unstable {
         t: from,
-        method: method_name,
+        method: method_name(SolverMethod::from(method) as i64),
         h,
         re: worst.re,
         im: worst.im,

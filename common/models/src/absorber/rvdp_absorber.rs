@@ -13,6 +13,7 @@ use super::rvdp_variables::{
     DesignOutputs, Dynamics, Energy, Inertia, Inputs, LawKind, Motion, Parameters, StabilityOutputs,
 };
 use super::synchronisation::Stability;
+use crate::port::along;
 
 /// Largest usable displacement and velocity [m, m/s]
 const LARGEST: f64 = 1e150;
@@ -63,7 +64,7 @@ impl RvdpAbsorber {
     }
 
     fn along<S: Scalar>(&self, v: &Vector3<S>) -> S {
-        v.x * self.e.x + v.y * self.e.y + v.z * self.e.z
+        along(&self.e, v)
     }
 
     fn axis<S: Scalar>(&self) -> Vector3<S> {
