@@ -43,7 +43,7 @@ fn hold<const C: usize>(fmu: &mut Named<Controller>, names: [(&str, f64); C]) {
 /// steps of 0.3 ms and 2.5 ms contain none, some or several of 1 ms.
 #[test]
 fn ticks_wait_for_the_step_that_begins_at_them() {
-    for (h, counts) in [(3e-4, [1, 1, 1, 1, 2, 2, 2, 3]), (2.5e-3, [3, 5, 8, 10, 13, 15, 18, 20])] {
+    for (h, counts) in [(3e-4, [1, 1, 1, 2, 2, 2, 3, 3]), (2.5e-3, [3, 5, 8, 10, 13, 15, 18, 20])] {
         let mut fmu = started::<Controller>(Interface::CoSimulation, &[]);
         for count in counts {
             fmu.step(h).expect("a step");
@@ -76,7 +76,7 @@ fn ticks_are_time_events_of_event_mode() {
     let event = updated(&mut fmu);
     assert_eq!((event.again, event.next), (false, Some(1e-3)));
     assert_eq!(get(&mut fmu, "tick"), 1.0);
-    let weight = get(&mut fmu, "axis[1].force_command");
+    let first = get(&mut fmu, "axis[2].force_command");
     fmu.instance.enter_step_mode().expect("Step Mode");
     assert!(fmu.step(1e-3).expect("a step"), "the tick at the end needs Event Mode");
     assert_eq!(get(&mut fmu, "tick"), 1.0);
@@ -84,7 +84,7 @@ fn ticks_are_time_events_of_event_mode() {
     hold(&mut fmu, [("W.r.z", 0.06)]);
     updated(&mut fmu);
     assert_eq!(get(&mut fmu, "tick"), 2.0);
-    assert!((get(&mut fmu, "axis[1].force_command") - weight).abs() > 100.0);
+    assert!((get(&mut fmu, "axis[2].force_command") - first).abs() > 100.0);
     // a longer step passes ticks inside with the inputs as they are
     fmu.instance.enter_step_mode().expect("Step Mode");
     fmu.step(2.5e-3).expect("a step");
@@ -156,11 +156,11 @@ fn a_fault_is_safe_and_latched() {
     hold(&mut fmu, [("sensor.F.x", 5.0)]);
     fmu.step(3e-3).expect("a step");
     assert!(get(&mut fmu, "axis[1].force_command").abs() > 1.0 && get(&mut fmu, "W.F.x") == 5.0);
-    hold(&mut fmu, [("axis[1].position", 0.1)]);
+    hold(&mut fmu, [("axis[1].position", 2.0)]);
     fmu.step(1e-3).expect("the run goes on");
     let messages = fmu.instance.take_warnings();
     assert_eq!(messages.len(), 1);
-    assert!(messages[0].contains("axis[1].position = 0.1 m"), "{messages:?}");
+    assert!(messages[0].contains("axis[1].position = 2 m"), "{messages:?}");
     hold(&mut fmu, [("axis[1].position", length(0.6))]);
     for _ in 0..3 {
         for name in ["axis[1].force_command", "axis[2].force_command", "W.F.x"] {
@@ -263,7 +263,7 @@ fn parameters_that_do_not_fit_are_refused_by_name() {
     refused::<Mechanism>(&[("stop.hi", -1.0)], &["stop.hi = -1", "> -0.9 rad"]);
     refused::<Mechanism>(&[("crank.length", 0.6)], &["room to close the four-bar"]);
     refused::<Mechanism>(&[("kind", 2.0), ("drawer.direction.x", 0.0)], &["drawer.direction.x = 0"]);
-    refused::<Wall>(&[("normal.z", 1e-13)], &["normal.z", "1e-12"]);
+    refused::<Wall>(&[("normal.z", 1e-13)], &["normal.z", "|normal| >= 1e-12"]);
 }
 
 /// A handle that starts at either limit of the stroke, to rounding, is accepted.
@@ -317,7 +317,8 @@ fn aligned_rods_raise_the_flag_and_nothing_else() {
 /// Speed, stiffness and command far out: right or refused, never out of bounds.
 #[test]
 fn extreme_plants_stay_bounded() {
-    let full_speed = [("H.start.z", 0.75), ("H.start.v.z", 2.0)];
+    // dopri5: the bristles' rate at 2 m/s is beyond the default step of rk4
+    let full_speed = [("H.start.z", 0.75), ("H.start.v.z", 2.0), ("solver.method", 3.0)];
     let cases: [(&[(&str, f64)], f64); 4] = [
         (&full_speed, 1e9),
         (&[("friction.F_s", 180.0)], 200.0),
@@ -338,7 +339,10 @@ fn extreme_plants_stay_bounded() {
         }
         let stored = get(&mut fmu, "energy.kinetic") + get(&mut fmu, "energy.potential") - start;
         let (supplied, heat) = (get(&mut fmu, "energy.supplied"), get(&mut fmu, "energy.dissipated"));
-        assert!((stored + heat - supplied).abs() < 1e-3 * heat.abs().max(1.0), "{settings:?}: {stored} {heat} {supplied}");
+        assert!(
+            (stored + heat - supplied).abs() < 1e-3 * heat.abs().max(1.0),
+            "{settings:?}: {stored} {heat} {supplied}"
+        );
     }
 }
 
@@ -350,7 +354,8 @@ fn stiff_bristles_need_an_implicit_method() {
     let fault = fmu.step(1e-3).expect_err("refused");
     assert_eq!(fault.status(), Status::Discard);
     assert!(fault.to_string().contains("rodas4"), "{fault}");
-    let mut fmu = started::<Plant>(Interface::CoSimulation, &[&stiff[..], &[("solver.method", 5.0)]].concat());
+    let mut fmu =
+        started::<Plant>(Interface::CoSimulation, &[&stiff[..], &[("solver.method", 5.0)]].concat());
     for _ in 0..20 {
         fmu.step(1e-3).expect("a step");
     }
@@ -361,7 +366,8 @@ fn stiff_bristles_need_an_implicit_method() {
 #[test]
 fn a_released_grip_gives_no_impulse() {
     for interface in [Interface::CoSimulation, EVENTS] {
-        let mut fmu = started::<Arm>(interface, &[("H.r.z", 0.57), ("port.inputs", 1.0)]);
+        let mut fmu =
+            started::<Arm>(interface, &[("H.r.z", 0.57), ("port.inputs", 1.0), ("solver.rtol", 1e-10)]);
         let step = |fmu: &mut Named<Arm>, enabled: f64| {
             fmu.set("grip.enabled", enabled).expect("0 or 1");
             if interface == EVENTS {

@@ -143,11 +143,7 @@ impl Device {
     ///
     /// # Errors
     /// Other poses.
-    pub fn start(
-        &self,
-        H: &Vector2<f64>,
-        stroke: Option<[f64; 2]>,
-    ) -> Result<[Leg<f64>; 2], ParameterError> {
+    pub fn start(&self, H: &Vector2<f64>, stroke: Option<[f64; 2]>) -> Result<[Leg<f64>; 2], ParameterError> {
         if self.side(H) < 0.0 {
             let reason = "the start pose is on the other side of the line from A to B";
             return Err(ParameterError::refused("H.start.z", H.y, reason, "the side of branch"));
@@ -170,7 +166,8 @@ impl Device {
         let g = self.g().map(S::lift);
         legs.iter().fold(g * S::lift(-self.m_H), |sum, Leg { l, u, t }| {
             let along = g.dot(u) * self.m_rod;
-            let across = g.dot(t) * ((*l - self.rod_com) * self.m_rod + self.m_housing * self.housing_com) / *l;
+            let across =
+                g.dot(t) * ((*l - self.rod_com) * self.m_rod + self.m_housing * self.housing_com) / *l;
             sum - u * along - t * across
         })
     }

@@ -2,25 +2,25 @@
 //!
 //! Source: the EFFI specification. The published abstract gives no equations; these are a design from standard models.
 
-mod arm;
 pub mod arm_variables;
-mod controller;
 pub mod controller_variables;
 pub mod device;
 mod drawer;
+mod effi_controller;
+mod effi_plant;
 pub mod fourbar;
 pub mod friction;
-mod mechanism;
 pub mod mechanism_variables;
-mod plant;
+mod operator_arm;
 pub mod plant_variables;
 mod reduced;
 pub mod sampler;
 mod stop;
-pub mod wall;
+mod virtual_mechanism;
+pub mod virtual_wall;
 
-pub use arm::Arm;
-pub use controller::Controller;
-pub use mechanism::Mechanism;
-pub use plant::Plant;
-pub use wall::Wall;
+pub use effi_controller::Controller;
+pub use effi_plant::Plant;
+pub use operator_arm::Arm;
+pub use virtual_mechanism::Mechanism;
+pub use virtual_wall::Wall;

@@ -122,8 +122,7 @@ const DRIVE_2: &[&str] = &["axis[2].force_command", "H.r", "H.v"];
 const RUBBING_1: &[&str] = &["H.r", "H.v", "axis[1].bristle"];
 const RUBBING_2: &[&str] = &["H.r", "H.v", "axis[2].bristle"];
 /// What the acceleration depends on: forces and bristles, not the commands.
-const DYNAMIC: &[&str] =
-    &["H", "axis[1].force", "axis[2].force", "axis[1].bristle", "axis[2].bristle"];
+const DYNAMIC: &[&str] = &["H", "axis[1].force", "axis[2].force", "axis[1].bristle", "axis[2].bristle"];
 
 /// Motion of the handle and the axes.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]

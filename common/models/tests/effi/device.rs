@@ -64,8 +64,7 @@ fn aligned_rods_are_reached_with_full_digits() {
     let mut p = Parameters { use_stop: false, ..plain() };
     (p.device.A.x, p.device.B.x) = (-0.5, 0.5);
     for row in &reference.rows {
-        let [x, z, l_1, l_2, det, cond] =
-            reference.all(row, ["x", "z", "l1", "l2", "detJ", "cond"]);
+        let [x, z, l_1, l_2, det, cond] = reference.all(row, ["x", "z", "l1", "l2", "detJ", "cond"]);
         let H = Vector2::new(x, z);
         let legs = p.device.legs(&H).expect("off the pivots");
         let own = determinant(&legs);

@@ -5,7 +5,9 @@ use model::{EvaluationError, Model, System, Variables, Vector2, Vector3};
 use models::effi::arm_variables as arm;
 use models::effi::controller_variables::{self as control, Mode};
 use models::effi::friction::FrictionModel;
-use models::effi::{Arm, Controller, Mechanism, Plant, Wall, mechanism_variables, plant_variables, wall};
+use models::effi::{
+    Arm, Controller, Mechanism, Plant, Wall, mechanism_variables, plant_variables, virtual_wall as wall,
+};
 
 use crate::csv::Reference;
 use crate::plant::{rubbing, solver, still};
@@ -130,7 +132,10 @@ fn flap() -> Scene {
         control: control::Parameters::default(),
         wall: None,
         mechanism: Some(mechanism_variables::Parameters {
-            parts: mechanism_variables::Use { energy: false, ..mechanism_variables::Parameters::default().parts },
+            parts: mechanism_variables::Use {
+                energy: false,
+                ..mechanism_variables::Parameters::default().parts
+            },
             ..Default::default()
         }),
     }
@@ -159,8 +164,14 @@ fn run(scene: &Scene, stop: usize, mut each: impl FnMut(usize, &Row)) {
         x[18..].copy_from_slice(&mechanism.start(0.0, &load()).expect("a start").0);
     }
     let mut sampled = controller.start(0.0, &load()).expect("a start").1;
-    let mut between =
-        Between { plant: &plant, arm: &arm, mechanism: mechanism.as_ref(), commands: [0.0; 2], W_F: Vector2::zeros(), hold };
+    let mut between = Between {
+        plant: &plant,
+        arm: &arm,
+        mechanism: mechanism.as_ref(),
+        commands: [0.0; 2],
+        W_F: Vector2::zeros(),
+        hold,
+    };
     let mut solver = solver(1e-10);
     for k in 0..=stop {
         #[allow(clippy::cast_precision_loss, reason = "some hundreds")]
@@ -254,7 +265,10 @@ fn stiff_wall_loop_goes_to_saturation_as_the_reference() {
     });
     // rows are 2 ms apart
     assert!((own_contact.expect("contact") - contact).abs() <= 2e-3 + 1e-3, "{own_contact:?} {contact}");
-    assert!((own_saturation.expect("saturation") - saturation).abs() <= 5e-3, "{own_saturation:?} {saturation}");
+    assert!(
+        (own_saturation.expect("saturation") - saturation).abs() <= 5e-3,
+        "{own_saturation:?} {saturation}"
+    );
     assert!(largest <= 2500.0);
 }
 

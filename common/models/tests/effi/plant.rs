@@ -37,7 +37,8 @@ pub(crate) struct Driven<'a, Y, D, U> {
     pub(crate) u: U,
 }
 
-impl<const N: usize, const Z: usize, Y, U> Ode<N> for Driven<'_, Sized<Y, N, Z>, <Y::Model as Model>::Discrete, U>
+impl<const N: usize, const Z: usize, Y, U> Ode<N>
+    for Driven<'_, Sized<Y, N, Z>, <Y::Model as Model>::Discrete, U>
 where
     Y: System<N, Z>,
     U: Fn(f64) -> <Y::Model as Model>::Inputs<f64>,
@@ -215,8 +216,11 @@ fn driven_fourbar_follows_the_reference() {
 /// kinetic + potential - start = supplied - dissipated, through stop, friction and saturation; integrals at the accuracy of the run.
 #[test]
 fn energy_law_holds_through_every_part() {
-    for model in [FrictionModel::None, FrictionModel::Viscous, FrictionModel::Regularised, FrictionModel::Lugre] {
-        let p = Parameters { start: Vector2::new(0.03, 0.77), friction: rubbing(model), ..Parameters::default() };
+    for model in
+        [FrictionModel::None, FrictionModel::Viscous, FrictionModel::Regularised, FrictionModel::Lugre]
+    {
+        let p =
+            Parameters { start: Vector2::new(0.03, 0.77), friction: rubbing(model), ..Parameters::default() };
         let plant = Sized::<_, 11, 1>(Plant::new(&p, &start()).expect("a pose"));
         let (mut x, d) = plant.0.start(0.0, &start()).expect("a pose");
         let u = |_| {

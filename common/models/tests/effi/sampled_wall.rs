@@ -7,7 +7,7 @@
 
 use model::{Model, Vector3};
 use models::effi::sampler::{Delay, RateFilter, Rendered};
-use models::effi::wall::{self, Wall};
+use models::effi::virtual_wall::{self as wall, Wall};
 use nalgebra::{DMatrix, DVector};
 
 use crate::csv::{Reference, close};
@@ -170,8 +170,7 @@ fn stability_boundary_agrees_with_the_table() {
 #[test]
 fn simulated_limit_is_the_exact_one_within_a_thousandth() {
     let moderate = |case: &Loop| case.b * case.T / case.m > 5e-3;
-    let sets: Vec<_> =
-        cases().into_iter().filter(|(case, [K, _])| K.is_finite() && moderate(case)).collect();
+    let sets: Vec<_> = cases().into_iter().filter(|(case, [K, _])| K.is_finite() && moderate(case)).collect();
     let stride = sets.len() / 20;
     let chosen: Vec<_> = sets.into_iter().step_by(stride).take(20).collect();
     assert_eq!(chosen.len(), 20);
@@ -218,10 +217,7 @@ fn impact(run: &Run) -> Vec<[f64; 4]> {
         if k % stride == 0 {
             rows.push([x, v, F, energy]);
         }
-        (x, v) = (
-            A[(0, 0)] * x + A[(0, 1)] * v + G[0] * held,
-            A[(1, 0)] * x + A[(1, 1)] * v + G[1] * held,
-        );
+        (x, v) = (A[(0, 0)] * x + A[(0, 1)] * v + G[0] * held, A[(1, 0)] * x + A[(1, 1)] * v + G[1] * held);
     }
     rows
 }

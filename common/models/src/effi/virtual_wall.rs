@@ -153,13 +153,8 @@ impl Model for Wall {
     fn new(p: &Parameters, _start: &NoVariables) -> Result<Self, ParameterError> {
         let length = p.n.norm();
         if length < SHORTEST {
-            let allowed = format!("|normal| >= {SHORTEST}");
-            return Err(ParameterError::refused(
-                "normal.z",
-                p.n.z,
-                "the normal has no direction",
-                allowed,
-            ));
+            let allowed = format!("|normal| >= {SHORTEST:e}");
+            return Err(ParameterError::refused("normal.z", p.n.z, "the normal has no direction", allowed));
         }
         Ok(Self(Parameters { n: p.n / length, ..*p }))
     }
@@ -239,7 +234,13 @@ impl System<2, 0> for Wall {
         let [dissipated, supplied] = *x;
         let zero = S::lift(0.0);
         let p = self.contact(&u.r, &u.v).penetration.max(zero);
-        Ok(Energy { kinetic: zero, potential: p * p * (0.5 * self.0.K), dissipated, supplied, port: supplied })
+        Ok(Energy {
+            kinetic: zero,
+            potential: p * p * (0.5 * self.0.K),
+            dissipated,
+            supplied,
+            port: supplied,
+        })
     }
 
     fn state_names(&self) -> [String; 2] {

@@ -161,8 +161,7 @@ impl Plant {
 
 impl Model for Plant {
     const NAME: &'static str = "effi_plant";
-    const DESCRIPTION: &'static str =
-        "Planar haptic interface: two screw-driven cylinders carry a handle, with motors, friction, end stops and encoders";
+    const DESCRIPTION: &'static str = "Planar haptic interface: two screw-driven cylinders carry a handle, with motors, friction, end stops and encoders";
     const EXPERIMENT: Experiment = Experiment { stop: 1.0, step: 0.001 };
     const DOCUMENTATION: Documentation = model::documentation!(
         "effi_plant",
