@@ -5,7 +5,7 @@ with library.scene("double_wishbone") as scene:
 """
 
 from cmath import exp, phase
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import acos, pi
 
 from .fmu import Value
@@ -161,25 +161,28 @@ def _tuned(absorber: str, mass: float, omega: float) -> dict[str, Value]:
     return {**at_rest, "stiffness": mass * own**2, "damping": 2.0 * zeta * mass * own}
 
 
-def haptic_wall(scene: Scene, stiffness: float = 2e4, **wall: Value):
+def haptic_wall(scene: Scene, stiffness: float = 2e4, arm: bool = True, **wall: Value):
     """An arm pushes the handle of the haptic interface through a virtual wall at z = 0.57; the device renders it by impedance.
 
-    `wall`: further parameters of the wall.
+    `arm`: False leaves the handle to itself. `wall`: further parameters of the wall.
     """
     start: dict[str, Value] = {"x": 0.0, "z": 0.575}
     velocity: dict[str, Value] = {"v.x": 0.05, "v.z": -0.15}
     plain: dict[str, Value] = {"friction.model": "viscous", "use.encoder": False}
     scene.add("controller", "effi_controller", mode="impedance")
     scene.add("plant", "effi_plant", **_prefixed("H.start", start | velocity), **plain)
-    end: dict[str, Value] = {"x": 0.08, "z": 0.5}
-    _arm(scene, start, end)
-    scene.set("arm", **_prefixed("start", velocity))
     scene.add("wall", "virtual_wall", stiffness=stiffness, **wall)
     _device(scene)
-    scene.connect("plant.H", "arm.H")
     scene.connect("controller.V", "wall.A")
-    scene.record(*_HANDLE, *_COMMANDS, "arm.H.F.x", "arm.H.F.z", "wall.A.F.z", "controller.energy.rendered", interval=0.005)
+    scene.record(*_HANDLE, *_COMMANDS, "wall.A.F.z", "controller.energy.rendered", interval=0.005)
+    if arm:
+        end: dict[str, Value] = {"x": 0.08, "z": 0.5}
+        _arm(scene, start, end)
+        scene.set("arm", **_prefixed("start", velocity))
+        scene.connect("plant.H", "arm.H")
+        scene.record("arm.H.F.x", "arm.H.F.z")
     scene.configure(method="cs-predict", H=1e-3, stop=0.6)
+    scene.reference = "extra/effi/loop_wall.csv"
 
 
 #: Variants of the mechanism: its parameters, coordinate, and start and end of the movement.
@@ -209,10 +212,13 @@ _RENDERED: dict[str, tuple[dict[str, Value], str, float, float]] = {
 }
 
 
-def haptic_mechanism(scene: Scene, kind: str = "flap", direct: bool = False, **values: Value):
+def haptic_mechanism(
+    scene: Scene, kind: str = "flap", direct: bool = False, cycle: bool = False, **values: Value
+):
     """An arm opens a flap, drawer or folding bed that the haptic interface renders by admittance.
 
-    `direct`: the arm holds the mechanism itself, for comparison. `values`: further parameters of the mechanism.
+    `direct`: the arm holds the mechanism itself, for comparison. `cycle`: it closes it as well, 2 s each. `values`: further
+    parameters of the mechanism.
     """
     own, coordinate, first, last = _RENDERED[kind]
     scene.add("mechanism", "virtual_mechanism", **{**own, **values})
@@ -223,6 +229,8 @@ def haptic_mechanism(scene: Scene, kind: str = "flap", direct: bool = False, **v
     ends = [_hand(scene.component("mechanism"), kind, q) for q in (first, last)]
     start, end = ({"x": x + shift[0], "z": z + shift[1]} for x, z in ends)
     _arm(scene, start, end, **{"grip.stiffness": 1000.0, "intent.duration": 2.0})
+    if cycle:
+        _there_and_back(scene, start, end, 4.0)
     if direct:
         scene.connect("mechanism.H", "arm.H")
     else:
@@ -246,14 +254,27 @@ _HANDLE = tuple(f"plant.H.{part}.{i}" for part in "rv" for i in "xz")
 _COMMANDS = tuple(f"controller.axis[{i}].force_command" for i in (1, 2))
 
 
-def _prefixed(prefix: str, values: dict[str, Value]) -> dict[str, Value]:
+def _prefixed(prefix: str, values: Mapping[str, Value]) -> dict[str, Value]:
     return {f"{prefix}.{name}": value for name, value in values.items()}
 
 
-def _arm(scene: Scene, start: dict[str, Value], end: dict[str, Value], **values: Value):
+def _arm(scene: Scene, start: Mapping[str, Value], end: Mapping[str, Value], **values: Value):
     """An operator who holds the handle at `start` and means to move it to `end`."""
     at = {f"{name}.{i}": place[i] for name, place in (("start.r", start), ("intent.start.r", start)) for i in "xz"}
     scene.add("arm", "operator_arm", **at, **_prefixed("intent.end.r", end), **values)
+
+
+def _there_and_back(scene: Scene, start: dict[str, float], end: dict[str, float], period: float):
+    """The operator means to move to `end` and back again."""
+    swing: dict[str, Value] = {"kind.y": "rest"}
+    for i in "xz":
+        middle, half = 0.5 * (start[i] + end[i]), 0.5 * (end[i] - start[i])
+        swing |= {f"kind.{i}": "sine", f"start.{i}": middle, f"amplitude.{i}": half}
+        swing |= {f"omega.{i}": 2.0 * pi / period, f"phase.{i}": -0.5 * pi}
+    scene.add("intention", "guide", **swing)
+    scene.set("arm", **{"intent.kind": "input"})
+    for quantity in ("r.x", "r.z", "v.x", "v.z"):
+        scene.connect_signal(f"intention.P.{quantity}", f"arm.intent.{quantity}")
 
 
 def _device(scene: Scene):

@@ -204,8 +204,16 @@ fn run(scene: &Scene, stop: usize, mut each: impl FnMut(usize, &Row)) {
     }
 }
 
-const COLUMNS: [&str; 8] =
-    ["H.r.x", "H.r.z", "H.v.x", "H.v.z", "axis[1].force", "axis[2].force", "arm.r.x", "arm.r.z"];
+const COLUMNS: [&str; 8] = [
+    "plant.H.r.x",
+    "plant.H.r.z",
+    "plant.H.v.x",
+    "plant.H.v.z",
+    "plant.axis[1].force",
+    "plant.axis[2].force",
+    "arm.hand.r.x",
+    "arm.hand.r.z",
+];
 const STATES: [usize; 8] = [0, 1, 2, 3, 4, 5, 11, 12];
 
 /// Largest errors of the columns as parts of their peaks, over the rows up to `stop` ticks.
@@ -213,9 +221,15 @@ fn errors(scene: &Scene, file: &str, stop: usize) -> Vec<(&'static str, f64)> {
     let reference = Reference::read(file);
     let mut columns: Vec<(&str, usize)> = COLUMNS.into_iter().zip(STATES).collect();
     if scene.mechanism.is_some() {
-        columns.extend([("phi", 18), ("phidot", 19)]);
+        columns.extend([("mechanism.phi", 18), ("mechanism.phi_rate", 19)]);
     }
-    let names = ["axis[1].force_command", "axis[2].force_command", "H.F.x", "H.F.z", "V.F.z"];
+    let names = [
+        "controller.axis[1].force_command",
+        "controller.axis[2].force_command",
+        "arm.H.F.x",
+        "arm.H.F.z",
+        "wall.A.F.z",
+    ];
     let mut worst: Vec<_> = columns.iter().map(|(name, _)| (*name, 0.0_f64)).collect();
     worst.extend(names.map(|name| (name, 0.0)));
     let mut rows = reference.rows.iter().peekable();
@@ -249,7 +263,7 @@ fn stiff_wall_loop_goes_to_saturation_as_the_reference() {
         let first = reference.rows.iter().find(|row| reference.at(row, name).abs() >= level);
         first.expect("reached")[0]
     };
-    let (contact, saturation) = (of("V.F.z", 1e-9), of("axis[1].force_command", 2499.0));
+    let (contact, saturation) = (of("wall.A.F.z", 1e-9), of("controller.axis[1].force_command", 2499.0));
     let (mut own_contact, mut own_saturation, mut largest) = (None, None, 0.0_f64);
     run(&at_wall(1e7), 200, |k, row| {
         #[allow(clippy::cast_precision_loss, reason = "some hundreds")]
