@@ -108,17 +108,16 @@ def test_the_flap_is_felt_as_it_is(fmu):
         assert 0.5 < result[f"plant.axis[{i}].position"].min() and result[f"plant.axis[{i}].position"].max() < 0.9
 
 
-@pytest.mark.parametrize("kind", haptics.LABELS)
-def test_rendered_is_like_direct(fmu, kind):
-    """One movement there and back: the hand feels the device follow within 5 mm and 15 % of the largest force (rms)."""
-    found, felt, direct = haptics.evaluate(fmu, kind)
+def test_rendered_is_like_direct(fmu):
+    """The drawer there and back: the hand follows the device within 2 mm and 1 % of the largest force; the closed movement costs the
+    work of the drawer's friction, whether it is rendered or not."""
+    found, felt, direct = haptics.evaluate(fmu, "drawer")
     assert found.command < 0.8 and found.margin > 0.0
-    assert found.position_rms < 5e-3 and found.force_rms < 0.15 * np.linalg.norm(direct.F, axis=0).max()
-    # friction of a closed movement costs work
-    assert found.hysteresis > 0.0 and direct.work > 0.0
+    assert found.position_max < 2e-3 and found.force_rms < 0.01 * np.linalg.norm(direct.F, axis=0).max()
+    assert felt.work == pytest.approx(direct.work, rel=0.02) and direct.work == pytest.approx(found.port, rel=0.02)
 
 
-@pytest.mark.parametrize("share", [-0.5, 0.0, 0.5])
+@pytest.mark.parametrize("share", [0.0, 0.5])
 def test_wall_on_the_device_has_the_exact_limit(fmu, share):
     """The device alone on the wall, 2 % around the boundary from the eigenvalues of mass, damping, current loop and one tick."""
     B = share * haptics.vertical(haptics.SURFACE).b

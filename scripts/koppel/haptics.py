@@ -183,7 +183,7 @@ def grows(K: float, B: float, fmus=None) -> bool:
     return bool(swing(t > 0.9) > swing((t > 0.3) & (t <= 0.6)))
 
 
-def observed(B: float, fmus=None, digits: int = 7) -> float:
+def observed(B: float, fmus=None, digits: int = 5) -> float:
     """The limit in the scene, to a part in 2^digits [N/m]."""
     exact = boundary(vertical(SURFACE), B)
     lo, hi = 0.8 * exact, 1.2 * exact
@@ -234,7 +234,7 @@ def draw_wall(fmus=None) -> list[list[float]]:
         K = [boundary(device, B, delay=delay) for B in damping]
         axes.semilogy(damping, K, label=label)
     axes.semilogy(damping, 2.0 * (device.b - np.abs(damping)) / 1e-3, "k--", label="passive: K < 2 (b - |B|)/T, no delay")
-    points = np.array([-0.5, -0.25, 0.0, 0.25, 0.5, 0.75]) * device.b
+    points = np.array([0.0, 0.25, 0.5, 0.75]) * device.b  # of a wall that is no source itself
     rows = [[float(B), boundary(device, B), observed(B, fmus)] for B in points]
     axes.plot(points, [row[2] for row in rows], "ko", label="scene with packed FMUs, one tick")
     axes.set_xlabel("damping of the wall [N.s/m]")

@@ -249,7 +249,7 @@ def haptic_mechanism(
 
 
 #: Where the device puts the origin of the mechanism [m].
-_OFFSETS = {"flap": (-0.07, 0.55), "drawer": (-0.07, 0.55), "bed": (-0.25, 0.45)}
+_OFFSETS = {"flap": (-0.07, 0.55), "drawer": (-0.07, 0.55), "bed": (-0.08, 0.24)}
 _HANDLE = tuple(f"plant.H.{part}.{i}" for part in "rv" for i in "xz")
 _COMMANDS = tuple(f"controller.axis[{i}].force_command" for i in (1, 2))
 

@@ -89,8 +89,11 @@ impl Written {
                 -(I_prime - 2.0 * I / l) * l_dot * th / l - 9.81 * (3.0 * arm + 8.0 * 0.15) * t_z / l;
             Q_x += u_x * along + t_x * turning;
             Q_z += u_z * along + t_z * turning;
-            let share =
-                if self.commands[i] * l_dot > 0.0 { ((0.5 - l_dot.abs()) / 0.1).clamp(0.0, 1.0) } else { 1.0 };
+            let share = if self.commands[i] * l_dot > 0.0 {
+                ((0.5 - l_dot.abs()) / 0.1).clamp(0.0, 1.0)
+            } else {
+                1.0
+            };
             f_dot[i] = (self.commands[i].clamp(-2500.0 * share, 2500.0 * share) - f[i]) * (TAU * 500.0);
         }
         let det = m_xx * m_zz - m_xz * m_xz;
@@ -129,7 +132,8 @@ fn main() {
         let mut all = [0.0; 11];
         all[..8].copy_from_slice(&START);
         if let Ok(rates) = plant.rates(0.0, &all, &inputs, &Default::default()) {
-            let apart = rates.iter().zip(written.rates(&START)).map(|(a, b)| (a - b).abs() / b.abs().max(1.0));
+            let apart =
+                rates.iter().zip(written.rates(&START)).map(|(a, b)| (a - b).abs() / b.abs().max(1.0));
             println!("largest difference: {:.1e}", apart.fold(0.0, f64::max));
         }
     }

@@ -127,7 +127,8 @@ fn dependencies_of_what_it_renders_are_exact() {
         ("drawer.v.start", 0.2),
         ("drawer.detent.energy", 1.0),
     ];
-    declared_are_observed::<Mechanism>(&[&[("phi_rate.start", 0.5)], &drawer]);
+    let in_stop = [("phi.start", 0.82), ("phi_rate.start", 0.5)];
+    declared_are_observed::<Mechanism>(&[&[("phi_rate.start", 0.5)], &in_stop, &drawer]);
     let wall = [("normal.x", 0.3), ("normal.y", 0.2), ("point.z", 3.0), ("damping", 10.0), ("friction", 0.3)];
     declared_are_observed::<Wall>(&[&wall]);
     let hand = [("start.v.x", 0.2), ("start.v.z", 0.3)];

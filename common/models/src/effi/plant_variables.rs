@@ -117,8 +117,8 @@ pub struct Inputs<S> {
 
 const POSE: &[&str] = &["H.r"];
 const MOVING: &[&str] = &["H.r", "H.v"];
-const DRIVE_1: &[&str] = &["axis[1].force_command", "H.r", "H.v"];
-const DRIVE_2: &[&str] = &["axis[2].force_command", "H.r", "H.v"];
+const DRIVE_1: &[&str] = &["axis[1].force_command", "axis[1].force", "H.r", "H.v"];
+const DRIVE_2: &[&str] = &["axis[2].force_command", "axis[2].force", "H.r", "H.v"];
 const RUBBING_1: &[&str] = &["H.r", "H.v", "axis[1].bristle"];
 const RUBBING_2: &[&str] = &["H.r", "H.v", "axis[2].bristle"];
 /// What the acceleration depends on: forces and bristles, not the commands.
@@ -153,10 +153,10 @@ pub struct Motion<S> {
     #[var(name = "axis[2].force", nominal = 1e2, state, rate_depends = DRIVE_2)]
     pub f_2: S,
     /// Deflection of the bristles of the first axis [m]
-    #[var(name = "axis[1].bristle", nominal = 1e-5, state, rate_depends = MOVING)]
+    #[var(name = "axis[1].bristle", nominal = 1e-5, state, rate_depends = RUBBING_1)]
     pub z_1: S,
     /// Deflection of the bristles of the second axis [m]
-    #[var(name = "axis[2].bristle", nominal = 1e-5, state, rate_depends = MOVING)]
+    #[var(name = "axis[2].bristle", nominal = 1e-5, state, rate_depends = RUBBING_2)]
     pub z_2: S,
     /// Friction of the first axis, against its motion [N]
     #[var(name = "axis[1].friction", nominal = 1e2, depends = RUBBING_1)]
