@@ -270,12 +270,12 @@ def draw_workspace():
     _save(figure, "haptic_workspace")
 
 
-LABELS = {"flap": "flap, gas spring 20 N", "drawer": "drawer", "bed": "folding bed"}
+LABELS = {"flap": "flap, gas spring 20 N", "drawer": "drawer"}
 
 
 def draw_mechanism(fmus=None) -> dict[str, Evaluation]:
     """Hand force over travel, rendered and direct, with the figures."""
-    figure, all_axes = _axes(11.0, 4.2, ncols=3)
+    figure, all_axes = _axes(9.0, 4.2, ncols=2)
     found = {}
     for axes, (kind, label) in zip(all_axes, LABELS.items()):
         found[kind], felt, direct = evaluate(fmus, kind)

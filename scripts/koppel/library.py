@@ -189,33 +189,13 @@ def haptic_wall(scene: Scene, stiffness: float = 2e4, arm: bool = True, **wall: 
 _RENDERED: dict[str, tuple[dict[str, Value], str, float, float]] = {
     "flap": ({"gas.force": 20.0}, "phi", -0.3, 0.2),
     "drawer": ({"kind": "drawer", "drawer.start.x": -0.05, "drawer.start.z": 0.1}, "drawer.s", 0.0, 0.25),
-    "bed": (
-        {
-            "mass": 25.0,
-            "inertia": 3.0,
-            "crank.length": 0.5,
-            "coupler.length": 0.25,
-            "rocker.length": 0.5,
-            "O2.z": 0.2,
-            "hand.x": 0.1,
-            "hand.z": -0.6,
-            "com.x": 0.1,
-            "com.z": -0.35,
-            "gas.force": 700.0,
-            "gas.base.x": 0.1,
-            "gas.base.z": -0.3,
-        },
-        "phi",
-        -0.3,
-        0.0,
-    ),
 }
 
 
 def haptic_mechanism(
     scene: Scene, kind: str = "flap", direct: bool = False, cycle: bool = False, **values: Value
 ):
-    """An arm opens a flap, drawer or folding bed that the haptic interface renders by admittance.
+    """An arm opens a flap or drawer that the haptic interface renders by admittance.
 
     `direct`: the arm holds the mechanism itself, for comparison. `cycle`: it closes it as well, 2 s each. `values`: further
     parameters of the mechanism.
@@ -224,8 +204,7 @@ def haptic_mechanism(
     scene.add("mechanism", "virtual_mechanism", **{**own, **values})
     scene.set("mechanism", **{f"{coordinate}.start": first})
     # where the hand is at both ends; the device works about its own centre
-    offset = _OFFSETS[kind]
-    shift = (0.0, 0.0) if direct else offset
+    shift = (0.0, 0.0) if direct else _OFFSET
     ends = [_hand(scene.component("mechanism"), kind, q) for q in (first, last)]
     start, end = ({"x": x + shift[0], "z": z + shift[1]} for x, z in ends)
     _arm(scene, start, end, **{"grip.stiffness": 1000.0, "intent.duration": 2.0})
@@ -234,7 +213,7 @@ def haptic_mechanism(
     if direct:
         scene.connect("mechanism.H", "arm.H")
     else:
-        about: dict[str, Value] = {"offset.x": offset[0], "offset.z": offset[1]}
+        about: dict[str, Value] = {"offset.x": _OFFSET[0], "offset.z": _OFFSET[1]}
         balanced: dict[str, Value] = {"start.balanced": True}
         scene.add("controller", "effi_controller", **balanced, **about)
         scene.add("plant", "effi_plant", **balanced, **{"use.encoder": False}, **_prefixed("H.start", start))
@@ -249,7 +228,7 @@ def haptic_mechanism(
 
 
 #: Where the device puts the origin of the mechanism [m].
-_OFFSETS = {"flap": (-0.07, 0.55), "drawer": (-0.07, 0.55), "bed": (-0.08, 0.24)}
+_OFFSET = (-0.07, 0.55)
 _HANDLE = tuple(f"plant.H.{part}.{i}" for part in "rv" for i in "xz")
 _COMMANDS = tuple(f"controller.axis[{i}].force_command" for i in (1, 2))
 

@@ -1,6 +1,6 @@
 //! Drawer or guided tool in its opening.
 
-use mechanics::Scalar;
+use mechanics::{Scalar, tanh};
 use model::{ParameterError, Vector2};
 
 use super::mechanism_variables::{DrawerParameters, Use};
@@ -54,7 +54,7 @@ impl Drawer {
     /// Friction and damping of soft close against a velocity [N]
     pub(super) fn friction<S: Scalar>(&self, s: S, v: S) -> S {
         let p = &self.p;
-        let mut F = v * p.visc + (v / p.v_c).tanh() * p.coul;
+        let mut F = v * p.visc + tanh(v / p.v_c) * p.coul;
         if self.parts.soft_close {
             let share = (-s / p.l_s + 1.0).clamp(S::lift(0.0), S::lift(1.0));
             F += share * v * p.c_s;

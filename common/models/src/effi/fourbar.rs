@@ -2,7 +2,7 @@
 //!
 //! Equations (15) to (18) of the write-up of `virtual_mechanism`; primes are derivatives by the crank angle.
 
-use mechanics::Scalar;
+use mechanics::{Scalar, tanh};
 use model::{EvaluationError, ParameterError, Vector2};
 
 use super::mechanism_variables::{FourbarParameters, Use};
@@ -149,6 +149,6 @@ impl Fourbar {
 
     /// Friction against a rate [N.m]
     pub(super) fn friction<S: Scalar>(&self, rate: S) -> S {
-        rate * self.p.visc + (rate / self.p.w_c).tanh() * self.p.coul
+        rate * self.p.visc + tanh(rate / self.p.w_c) * self.p.coul
     }
 }

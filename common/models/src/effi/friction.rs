@@ -9,7 +9,7 @@
 //! Source: Canudas de Wit et al. (1995); the weight of s1 falls with the speed against the non-passivity of a constant s1
 //! (Olsson 1996).
 
-use mechanics::Scalar;
+use mechanics::{Scalar, tanh};
 use model::{Enumeration, ParameterError, Variables};
 
 /// Law of friction
@@ -93,7 +93,7 @@ impl Friction {
                 Rubbing { F: z * self.s0 + Self::bell(v, self.v_d) * z_dot * self.s1 + viscous, z_dot }
             }
             FrictionModel::Regularised => {
-                Rubbing { F: viscous + g() * (v / (0.1 * self.v_s)).tanh(), z_dot: still }
+                Rubbing { F: viscous + g() * tanh(v / (0.1 * self.v_s)), z_dot: still }
             }
             FrictionModel::Viscous | FrictionModel::Lugre => Rubbing { F: viscous, z_dot: still },
         }

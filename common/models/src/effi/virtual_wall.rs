@@ -1,6 +1,6 @@
 #![doc = include_str!("virtual_wall.md")]
 
-use mechanics::Scalar;
+use mechanics::{Scalar, tanh};
 use model::{
     Dense, Documentation, EvaluationError, Experiment, Model, NoVariables, ParameterError, SymmetricTensor,
     System, Variables, Vector3, Visitor,
@@ -125,7 +125,7 @@ impl Wall {
             let F_t = v_t * (F_n * (-mu / SMOOTHING)); // the limit at rest
             return Contact { penetration, F: n * F_n + F_t };
         }
-        let F_t = v_t * (-F_n * *mu * (speed / SMOOTHING).tanh() / speed);
+        let F_t = v_t * (-F_n * *mu * tanh(speed / SMOOTHING) / speed);
         Contact { penetration, F: n * F_n + F_t }
     }
 }
