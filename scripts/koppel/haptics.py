@@ -247,22 +247,22 @@ def draw_wall(fmus=None) -> list[list[float]]:
 
 def draw_workspace():
     """Where the stroke lets the handle go, det J there, and the largest static force in each direction."""
-    x, z = np.meshgrid(np.linspace(-0.6, 0.6, 481), np.linspace(0.0, 0.95, 381))
+    x, z = np.meshgrid(np.linspace(-0.6, 0.6, 481), np.linspace(0.01, 0.95, 377))
     r = np.stack([x, z], axis=-1)
     l = np.linalg.norm(r[..., None, :] - PIVOTS, axis=-1)
     inside = ((l >= 0.5) & (l <= 0.9)).all(axis=-1)
     figure, axes = _axes(7.0, 5.2)
     shown = np.where(inside, np.abs(determinant(r)), np.nan)
-    mesh = axes.pcolormesh(x, z, shown, shading="auto", cmap="viridis", vmin=0.0, vmax=1.0, rasterized=True)
+    mesh = axes.pcolormesh(x, z, shown, shading="auto", cmap="viridis", vmin=0.6, vmax=1.0, rasterized=True)
     figure.colorbar(mesh, label="|det J| [1]")
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
     directions = np.column_stack([np.cos(angle), np.sin(angle)])
     for place in ((0.0, 0.42), (0.0, 0.6), (0.0, 0.77), (-0.2, 0.6), (0.2, 0.6)):
-        force = strongest(np.array(place), directions)[:, None] * directions * 3e-5
-        axes.plot(place[0] + force[:, 0], place[1] + force[:, 1], "w-", lw=1.2)
+        force = strongest(np.array(place), directions)[:, None] * directions * 1.5e-5
+        axes.plot(place[0] + force[:, 0], place[1] + force[:, 1], "k-", lw=1.2)
     axes.plot(*PIVOTS.T, "k^", label="pivots A, B")
-    axes.plot([-0.58, -0.58 + 3e-5 * F_PEAK], [0.04, 0.04], "k-", lw=1.2)
-    axes.text(-0.58, 0.055, "force limit (white): 2.5 kN", fontsize=8)
+    axes.plot([-0.58, -0.58 + 1.5e-5 * F_PEAK], [0.04, 0.04], "k-", lw=1.2)
+    axes.text(-0.58, 0.055, "scale of the force limit: 2.5 kN", fontsize=8)
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("z [m]")

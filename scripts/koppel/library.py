@@ -225,6 +225,7 @@ def haptic_mechanism(
     names = ["mechanism.H.r.x", "mechanism.H.r.z", "mechanism.H.v.x", "mechanism.H.v.z", f"mechanism.{coordinate}"]
     scene.record(*names, "mechanism.energy.port", "arm.H.F.x", "arm.H.F.z", interval=0.01)
     scene.configure(method="cs-predict", H=1e-3, stop=3.0)
+    scene.reference = None if direct or cycle or kind != "flap" or values else "extra/effi/haptic_mechanism.csv"
 
 
 #: Where the device puts the origin of the mechanism [m].
