@@ -80,7 +80,7 @@ def test_fmpy_simulates_with_validation(fmu, name, interface, tmp_path):
 
 
 # terminals --------------------------------------------------------------------------------------------------------
-# ports of suspension.md, coupling.md, rvdp_absorber.md and effi.md by kind; the closed or fixed points of the assemblies are no ports
+# ports of suspension.md, coupling.md, rvdp_absorber.md and effi.md by kind; closed or fixed points are no ports
 PORTS = {
     "bushing": {"A": "follower", "B": "follower"},
     "double_pendulum": {"C": "leader"},
@@ -106,7 +106,7 @@ PLANAR_MEMBERS = [f"{quantity}.{axis}" for quantity in "rvaF" for axis in "xz"] 
 SCALAR_MEMBERS = ["s", "v", "a", "F", "M"]
 #: Models whose ports move in the plane, so that they have no y components.
 PLANAR = {"effi_controller", "effi_plant", "operator_arm", "virtual_mechanism"}
-#: Motion without acceleration, as a force law and a leader known at samples give and take it; the latter takes no inertia either.
+#: A force law and a leader that is known at samples have no acceleration, the latter takes no inertia either.
 LACKS = {"force": ("a.",), "leader.sampled": ("a.", "M.")}
 #: Ports in one coordinate, and those that have both forms.
 SCALAR, BOTH = {("guide", "H"), ("rvdp_absorber", "P")}, {("primary_oscillator", "A"), ("primary_oscillator", "P")}

@@ -1,4 +1,4 @@
-"""The haptic interface through the packed FMUs against `tests/reference/effi` (programs written separately), and its invariants."""
+"""The haptic interface through the packed FMUs against `tests/reference/effi` (programs written separately)."""
 
 import json
 
@@ -29,14 +29,14 @@ def wall(fmu, H=1e-3, stop=0.6, order=1, **values):
 
 
 def test_wall_loop_follows_the_reference(fmu):
-    """Arm and plant exchange motion and force every millisecond, their inputs hold or go on along a line: 1e-2 of the peaks."""
+    """Arm and plant exchange motion and force every millisecond, inputs hold or go on along a line: 1e-2."""
     for order in (0, 1):
         worst = errors(wall(fmu, order=order), "loop_wall", STATES)
         assert max(worst.values()) <= 1e-2, (order, worst)
 
 
 def test_wall_loop_has_order_one_with_held_inputs(fmu):
-    """The controller ticks every millisecond whatever the exchange of arm and plant: the error is that of the exchange."""
+    """The controller ticks every millisecond whatever arm and plant do: the error is that of their exchange."""
     coarse, fine = (errors(wall(fmu, H=H, order=0), "loop_wall", STATES) for H in (1e-3, 0.25e-3))
     for name in STATES:
         assert 3.2 < coarse[name] / fine[name] < 5.0, (name, coarse, fine)
@@ -83,8 +83,8 @@ def test_a_sampled_leader_takes_massless_followers_only(fmu):
 
 
 def test_wall_rendered_late_or_slowly_is_right(fmu):
-    """Ticks of 10 ms, or a queue of ten: far below the limit of the wall (30 and 42 kN/m), the motion does not depend on how arm
-    and plant exchange: 1e-2 of the peaks between 1 ms and 0.25 ms; the wall holds."""
+    """Ticks of 10 ms, or a queue of ten: far below the limit of the wall (30 and 42 kN/m), the motion does not depend
+    on how arm and plant exchange: 1e-2 of the peaks between 1 ms and 0.25 ms; the wall holds."""
     for settings in ({"T": 1e-2}, {"delay": 10}):
         runs = []
         for H in (1e-3, 0.25e-3):
@@ -99,8 +99,7 @@ def test_wall_rendered_late_or_slowly_is_right(fmu):
 
 # what it is for -------------------------------------------------------------------------------------------------------
 def test_the_flap_is_felt_as_it_is(fmu):
-    """Opening movement of 2 s: it snaps into the detent; commands below 0.8 of the peak force, away from the end stops; the work of
-    the hand at the rendered mechanism is what the mechanism gets."""
+    """Opening movement of 2 s: it snaps into the detent; commands below 0.8 of the peak force, no end stop is met."""
     result = library.scene("haptic_mechanism", fmu).run()
     assert 0.32 < result["mechanism.phi"].max() < 0.35
     for i in (1, 2):
@@ -109,8 +108,8 @@ def test_the_flap_is_felt_as_it_is(fmu):
 
 
 def test_rendered_is_like_direct(fmu):
-    """The drawer there and back: the hand follows the device within 2 mm and 1 % of the largest force; the closed movement costs the
-    work of the drawer's friction, whether it is rendered or not."""
+    """The drawer there and back: within 2 mm and 1 % of the largest force of the direct grip; the closed movement costs
+    the work of the drawer's friction, whether it is rendered or not."""
     found, felt, direct = haptics.evaluate(fmu, "drawer")
     assert found.command < 0.8 and found.margin > 0.0
     assert found.position_max < 2e-3 and found.force_rms < 0.01 * np.linalg.norm(direct.F, axis=0).max()
@@ -119,7 +118,7 @@ def test_rendered_is_like_direct(fmu):
 
 @pytest.mark.parametrize("share", [0.0, 0.5])
 def test_wall_on_the_device_has_the_exact_limit(fmu, share):
-    """The device alone on the wall, 2 % around the boundary from the eigenvalues of mass, damping, current loop and one tick."""
+    """The device alone on the wall, 2 % around the limit from eigenvalues of mass, damping, current loop and one tick."""
     B = share * haptics.vertical(haptics.SURFACE).b
     limit = haptics.boundary(haptics.vertical(haptics.SURFACE), B)
     assert not haptics.grows(0.98 * limit, B, fmu) and haptics.grows(1.02 * limit, B, fmu)

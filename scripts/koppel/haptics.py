@@ -1,16 +1,18 @@
-"""What the haptic interface lets feel: evaluation of a rendered mechanism, the limit of a virtual wall, the device's workspace.
+"""What the haptic interface lets feel: evaluation of a rendered mechanism, limit of a virtual wall, workspace.
 
 python -m koppel.haptics    docs/haptic_{wall,workspace,mechanism,study}.png, out/haptics/*.csv, tables
 """
 
 import csv
 from dataclasses import asdict, dataclass, fields
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import expm
 
 from . import library, paths
+from .fmu import Fmu
 from .scene import SceneResult
 
 F_PEAK = 2500.0
@@ -19,7 +21,7 @@ DETENT, WIDTH = 0.3, 0.05
 PIVOTS = np.array([[-0.35, 0.0], [0.35, 0.0]])
 
 
-# a rendered mechanism ---------------------------------------------------------------------------------------------------
+# a rendered mechanism -----------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Evaluation:
     """Over one opening and closing movement."""
@@ -115,7 +117,7 @@ def evaluate(fmus=None, kind: str = "flap", **values) -> tuple[Evaluation, Felt,
     return found, felt, direct
 
 
-# the limit of a wall ----------------------------------------------------------------------------------------------------
+# the limit of a wall ------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Vertical:
     """The default device at (0, z), moving along z with viscous friction: mass [kg], damping [N.s/m], weight [N]."""
@@ -136,7 +138,11 @@ def vertical(z: float) -> Vertical:
     return Vertical(m, 2.0 * 300.0 * u**2, weight)
 
 
-def radius(device: Vertical, K: float, B: float, T: float = 1e-3, delay: int = 1, tau: float = 1.0 / (1000.0 * np.pi)) -> float:
+#: Time constant of the default current loop [s]
+LAG = 1.0 / (1000.0 * np.pi)
+
+
+def radius(device: Vertical, K: float, B: float, T: float = 1e-3, delay: int = 1, tau: float = LAG) -> float:
     """Spectral radius of the held-force loop: states x, v, f, x of the last tick, and the queue of commands."""
     A = np.zeros((4, 4))
     A[0, 1], A[1, 1:3], A[2, 2:] = 1.0, [-device.b / device.m, 1.0 / device.m], [-1.0 / tau, 1.0 / tau]
@@ -193,7 +199,7 @@ def observed(B: float, fmus=None, digits: int = 5) -> float:
     return 0.5 * (lo + hi)
 
 
-# the device -------------------------------------------------------------------------------------------------------------
+# the device ---------------------------------------------------------------------------------------------------------
 def determinant(r: np.ndarray, pivots: np.ndarray = PIVOTS) -> np.ndarray:
     """det J at the places r[.., 2]."""
     u = r[..., None, :] - pivots
@@ -208,7 +214,7 @@ def strongest(r: np.ndarray, directions: np.ndarray, pivots: np.ndarray = PIVOTS
     return F_PEAK / np.abs(np.linalg.solve(J.T, directions.T)).max(axis=0)
 
 
-# diagrams ---------------------------------------------------------------------------------------------------------------
+# diagrams -----------------------------------------------------------------------------------------------------------
 def _axes(width: float, height: float, **how):
     import matplotlib
 
@@ -233,13 +239,15 @@ def draw_wall(fmus=None) -> list[list[float]]:
     for delay, label in ((0, "exact, no delay"), (1, "exact, one tick (default)"), (3, "exact, three ticks")):
         K = [boundary(device, B, delay=delay) for B in damping]
         axes.semilogy(damping, K, label=label)
-    axes.semilogy(damping, 2.0 * (device.b - np.abs(damping)) / 1e-3, "k--", label="passive: K < 2 (b - |B|)/T, no delay")
+    passive = 2.0 * (device.b - np.abs(damping)) / 1e-3
+    axes.semilogy(damping, passive, "k--", label="passive: K < 2 (b - |B|)/T, no delay")
     points = np.array([0.0, 0.25, 0.5, 0.75]) * device.b  # of a wall that is no source itself
     rows = [[float(B), boundary(device, B), observed(B, fmus)] for B in points]
     axes.plot(points, [row[2] for row in rows], "ko", label="scene with packed FMUs, one tick")
     axes.set_xlabel("damping of the wall [N.s/m]")
     axes.set_ylabel("largest stable stiffness [N/m]")
-    axes.set_title(f"Virtual wall on {device.m:.1f} kg and {device.b:.0f} N.s/m, T = 1 ms, current loop 500 Hz", fontsize=10)
+    title = f"Virtual wall on {device.m:.1f} kg and {device.b:.0f} N.s/m, T = 1 ms, current loop 500 Hz"
+    axes.set_title(title, fontsize=10)
     axes.legend(fontsize=8)
     _save(figure, "haptic_wall")
     return rows
@@ -284,7 +292,8 @@ def draw_mechanism(fmus=None) -> dict[str, Evaluation]:
         axes.plot(1e3 * direct.travel, direct.along, "--", label="direct")
         text = f"peak {e.peak:.1f} N\nhysteresis {e.hysteresis:.2f} J\nrendered - direct:\n{e.force_rms:.2f} N rms, "
         text += f"{1e3 * e.position_rms:.2f} mm rms\ncommand {100.0 * e.command:.0f} % of peak"
-        axes.text(0.03, 0.03, text, transform=axes.transAxes, fontsize=7.5, bbox={"facecolor": "w", "alpha": 0.8, "lw": 0})
+        box = {"facecolor": "w", "alpha": 0.8, "lw": 0}
+        axes.text(0.03, 0.03, text, transform=axes.transAxes, fontsize=7.5, bbox=box)
         axes.set_title(label, fontsize=10)
         axes.set_xlabel("travel of the hand, there and back [mm]")
     all_axes[0].set_ylabel("hand force along the path [N]")
@@ -297,7 +306,7 @@ GAS, HINGE = (0.0, 20.0, 40.0, 60.0), (0.09, 0.10, 0.11)
 
 
 def draw_study(fmus=None) -> list[list[float]]:
-    """Peak, detent drop and hysteresis over the gas spring's force, for positions of the hinge; the rows of the diagram."""
+    """Peak, detent drop and hysteresis over the gas spring's force, for positions of the hinge; the rows."""
     figure, all_axes = _axes(11.0, 3.8, ncols=3)
     rows = []
     for hinge in HINGE:
@@ -323,16 +332,18 @@ def _write(name: str, header: list[str], rows):
 def main():
     """`scripts/haptics`"""
     names = [f.name for f in fields(Evaluation)]
+    # unpacked once
+    fmus = cache(lambda name: Fmu(paths.fmu(name)))
     draw_workspace()
-    found = draw_mechanism()
+    found = draw_mechanism(fmus)
     _write("mechanism", ["kind", *names], [[kind, *asdict(e).values()] for kind, e in found.items()])
     for kind, e in found.items():
         print(f"{kind}: " + ", ".join(f"{name} {value:.4g}" for name, value in asdict(e).items()), flush=True)
-    rows = draw_wall()
+    rows = draw_wall(fmus)
     _write("wall", ["damping", "exact", "observed"], rows)
     for B, exact, seen in rows:
         print(f"wall, B = {B:7.1f} N.s/m: exact {exact:.0f} N/m, scene {seen:.0f} N/m", flush=True)
-    _write("study", ["hinge", "gas", *names], draw_study())
+    _write("study", ["hinge", "gas", *names], draw_study(fmus))
     print("== docs/haptic_{workspace,mechanism,wall,study}.png")
 
 

@@ -162,7 +162,7 @@ def _tuned(absorber: str, mass: float, omega: float) -> dict[str, Value]:
 
 
 def haptic_wall(scene: Scene, stiffness: float = 2e4, arm: bool = True, **wall: Value):
-    """An arm pushes the handle of the haptic interface through a virtual wall at z = 0.57; the device renders it by impedance.
+    """An arm pushes the handle of the haptic interface through a virtual wall at z = 0.57, rendered by impedance.
 
     `arm`: False leaves the handle to itself. `wall`: further parameters of the wall.
     """
@@ -197,8 +197,8 @@ def haptic_mechanism(
 ):
     """An arm opens a flap or drawer that the haptic interface renders by admittance.
 
-    `direct`: the arm holds the mechanism itself, for comparison. `cycle`: it closes it as well, 2 s each. `values`: further
-    parameters of the mechanism.
+    `direct`: the arm holds the mechanism itself, for comparison. `cycle`: it closes it as well, 2 s each. `values`:
+    further parameters of the mechanism.
     """
     own, coordinate, first, last = _RENDERED[kind]
     scene.add("mechanism", "virtual_mechanism", **{**own, **values})
