@@ -118,7 +118,7 @@ def test_rendered_is_like_direct(fmu):
 
 @pytest.mark.parametrize("share", [0.0, 0.5])
 def test_wall_on_the_device_has_the_exact_limit(fmu, share):
-    """The device alone on the wall, 2 % around the limit from eigenvalues of mass, damping, current loop and one tick."""
+    """The device on the wall, 2 % around the limit from eigenvalues of mass, damping, current loop and one tick."""
     B = share * haptics.vertical(haptics.SURFACE).b
     limit = haptics.boundary(haptics.vertical(haptics.SURFACE), B)
     assert not haptics.grows(0.98 * limit, B, fmu) and haptics.grows(1.02 * limit, B, fmu)
