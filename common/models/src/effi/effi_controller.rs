@@ -305,6 +305,7 @@ impl System<0, 0> for Controller {
         Sampled { after, output, ..*d }
     }
 
+    #[allow(clippy::float_cmp, reason = "an output has changed or it has not")]
     fn awaits_answer(&self, before: &Sampled, after: &Sampled) -> bool {
         let (then, now) = (&before.output, &after.output);
         match self.p.mode {
