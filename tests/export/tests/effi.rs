@@ -1,6 +1,7 @@
 //! The haptic interface's FMUs as a host uses them: ticks of the sampled controller, faults, extreme values.
 
 #![allow(non_snake_case, reason = "symbols of the write-ups")]
+#![allow(clippy::float_cmp, reason = "whole numbers, and values that must not differ")]
 
 use export_tests::Named;
 use fmu_export::{Event, Interface, Status};
