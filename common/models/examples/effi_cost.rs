@@ -131,7 +131,7 @@ fn main() {
     if let Ok(plant) = Plant::new(&plain, &motion) {
         let mut all = [0.0; 11];
         all[..8].copy_from_slice(&START);
-        if let Ok(rates) = plant.rates(0.0, &all, &inputs, &Default::default()) {
+        if let Ok(rates) = plant.rates(0.0, &all, &inputs, &<Plant as Model>::Discrete::default()) {
             let apart =
                 rates.iter().zip(written.rates(&START)).map(|(a, b)| (a - b).abs() / b.abs().max(1.0));
             println!("largest difference: {:.1e}", apart.fold(0.0, f64::max));
