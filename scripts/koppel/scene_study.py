@@ -32,8 +32,12 @@ class Plan:
 
 
 _SMALL = Plan((10e-3, 5e-3, 2.5e-3, 1e-3, 0.5e-3, 0.1e-3), (10e-3, 5e-3, 2.5e-3))
+#: A sampled controller: communication points at its ticks, and between them for arm and plant.
+_SAMPLED = tuple(method for method in METHODS if method.name == "cs predict")
 PLANS = {
     "absorber_on_oscillator": Plan((10e-3, 5e-3, 2e-3, 1e-3, 0.5e-3), (10e-3, 5e-3, 2e-3), kept_stop=5.0),
+    "haptic_wall": Plan((0.5e-3, 0.25e-3, 0.125e-3, 0.0625e-3), (0.5e-3, 0.25e-3), methods=_SAMPLED, kept_stop=0.2),
+    "haptic_mechanism": Plan((0.2e-3, 0.1e-3, 0.05e-3), (0.2e-3, 0.1e-3), methods=_SAMPLED, kept_stop=0.2),
     "two_mass": _SMALL,
     "double_pendulum": _SMALL,
     "four_bar": Plan((15e-3, 7.5e-3, 3.75e-3, 1.5e-3, 0.75e-3, 0.15e-3), (15e-3, 7.5e-3, 3.75e-3)),

@@ -29,7 +29,7 @@ pub struct Instance<M: Model> {
     pub(crate) moving: Vec<f64>,
     /// The same for the method `exact`
     pub(crate) linear: LinearCache,
-    warnings: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 impl<M: Model> Default for Instance<M> {
@@ -68,6 +68,12 @@ impl<M: Model> Instance<M> {
     #[must_use]
     pub fn token() -> String {
         Table::shared::<M>().token()
+    }
+
+    /// True if the last call has left messages.
+    #[must_use]
+    pub fn has_warnings(&self) -> bool {
+        !self.warnings.is_empty()
     }
 
     /// Messages of the last call about things that are allowed but probably not meant.

@@ -99,11 +99,16 @@ static WITHOUT_AUTO: EnumType = {
     EnumType { name: all.name, description: all.description, items: all.items.split_at(7).0 }
 };
 
-/// Type, method and tolerances by which the model `M` is solved unless others are set.
+/// Type, method, step and tolerances by which the model `M` is solved unless others are set.
 pub(crate) fn defaults<M: Model>(solver: &mut [Variable]) {
     let [rtol, atol] = M::TOLERANCES;
     #[allow(clippy::cast_precision_loss, reason = "a small number")]
-    let starts = [("solver.method", M::METHOD as f64), ("solver.rtol", rtol), ("solver.atol", atol)];
+    let starts = [
+        ("solver.method", M::METHOD as f64),
+        ("solver.step", M::STEP),
+        ("solver.rtol", rtol),
+        ("solver.atol", atol),
+    ];
     for Variable { name, entry, .. } in solver {
         if let Some((_, start)) = starts.iter().find(|(n, _)| n == name) {
             entry.start = *start;

@@ -105,6 +105,7 @@ impl<M: Model> Instance<M> {
         };
         let h = solver.settings().inner_step(step);
         let fixed = !solver.settings().method.is_adaptive();
+        let before = *discrete;
         let leave_events = *interface == Interface::CoSimulationWithEvents;
         let event = model.with_system(Step {
             from,
@@ -122,6 +123,7 @@ impl<M: Model> Instance<M> {
             statistics,
             linear: &mut self.linear,
         })?;
+        self.warnings.extend(M::notice(&before, discrete));
         *guarded = h;
         SolverCounters::from(*statistics).store(&mut values[Layout::<M>::COUNTERS]);
         if let [jacobians] = &mut values[Layout::<M>::AUTO_COUNTERS] {

@@ -4,7 +4,9 @@
 #![allow(non_snake_case, reason = "names are the papers' symbols: F_A, M, q_ddot")]
 
 pub mod absorber;
+pub mod effi;
 pub mod force_law;
+mod min_jerk;
 pub mod parts;
 pub mod port;
 pub mod suspension;

@@ -213,7 +213,7 @@ class Scene:
             raise SceneError(f"{first} and {second}: a scalar port cannot be connected to a spatial one")
         if factor != 1.0 and not raw:
             raise SceneError(f"{first} and {second}: a factor ({factor}) is for raw connections, inertia has no sign")
-        axes = self._axes(lead, follow)
+        axes = self._axes((lead, leader), (follow, follower))
         slot = slot or self._free_slot(lead, leader, axes)
         back = ports.force_pairs(leader, follower, axes, slot, raw)
         forward = ports.motion_pairs(leader, follower, axes) if motion else []
@@ -314,12 +314,13 @@ class Scene:
         except SceneError as unknown:
             raise SceneError(f"{component.name}: {unknown}") from None
 
-    def _axes(self, *components: Component) -> tuple[str, ...]:
-        return ("x", "z") if any(component.planar for component in components) else AXES
+    def _axes(self, *ends: tuple[Component, Port]) -> tuple[str, ...]:
+        planar = any(component.planar or port.planar for component, port in ends)
+        return ("x", "z") if planar else AXES
 
     def joint_axes(self, joint: Joint) -> tuple[str, ...]:
         """Axes in which the joint closes."""
-        return self._axes(self.split(joint.first)[0], self.split(joint.second)[0])
+        return self._axes(self.port(joint.first), self.port(joint.second))
 
     def _free_slot(self, component: Component, port: Port, axes: tuple[str, ...], besides: Iterable[str] = ()) -> int:
         used = {variable for name, variable in self._sources if name == component.name} | set(besides)

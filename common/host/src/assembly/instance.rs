@@ -215,6 +215,10 @@ impl Exported for Assembly {
         self.interface.standard().type_name(kind)
     }
 
+    fn has_warnings(&self) -> bool {
+        !self.warnings.is_empty()
+    }
+
     fn take_warnings(&mut self) -> Vec<String> {
         std::mem::take(&mut self.warnings)
     }
