@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from math import acos, pi
 
 from .fmu import Value
-from .scene import Scene
+from .scene import Scene, foreign, ssp
 
 GRAVITY = -9.81
 
@@ -303,6 +303,21 @@ SCENES: dict[str, Callable[..., None]] = {
         haptic_mechanism,
     )
 }
+
+
+#: Springs and dampers in place of the closing joints, and the communication step that they need.
+COMPLIANT: dict[str, dict[str, float]] = {
+    "four_bar": {"stiffness": 1e5, "damping": 1e2, "H": 2e-4},
+    "double_wishbone": {"stiffness": 1e6, "damping": 1e3, "H": 2e-4},
+}
+
+
+def variants(scene: Scene) -> dict[str, Scene]:
+    """The scene by its file name, and its variants."""
+    found = {ssp.FILE: scene}
+    if scene.name in COMPLIANT:
+        found[foreign.FILE] = foreign.compliant(scene, **COMPLIANT[scene.name])
+    return found
 
 
 def scene(name: str, fmus=None, **options) -> Scene:

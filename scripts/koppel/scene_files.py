@@ -1,24 +1,25 @@
-"""`python -m koppel.scene_files [--check] [NAME...]`: the scenes of the library as `scenes/<name>/SystemStructure.ssd`."""
+"""`python -m koppel.scene_files [--check] [NAME...]`: the scenes of the library as `scenes/<name>/*.ssd`."""
 
 import argparse
 import sys
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 
 from . import library, paths
 from .scene import SceneError
-from .scene.ssp import FILE, text
+from .scene.ssp import text
 
 FOLDER = paths.ROOT / "scenes"
 
 
-def outdated(names: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Scenes whose file is not what the library says, with the text that it should have."""
+def outdated(names: Iterable[str]) -> Iterator[tuple[Path, str]]:
+    """Files that are not what the library says, with the text that they should have."""
     for name in names:
         with library.scene(name) as scene:
-            wanted = text(scene)
-        path = FOLDER / name / FILE
-        if not path.is_file() or path.read_text(encoding="utf-8") != wanted:
-            yield name, wanted
+            wanted = {FOLDER / name / file: text(variant) for file, variant in library.variants(scene).items()}
+        for path, content in wanted.items():
+            if not path.is_file() or path.read_text(encoding="utf-8") != content:
+                yield path, content
 
 
 def buildable() -> Iterator[str]:
@@ -42,8 +43,7 @@ def main() -> int:
     if unknown:
         parser.error(f"no scene {', '.join(sorted(unknown))}; there are: {', '.join(library.SCENES)}")
     old = list(outdated(options.names or buildable()))
-    for name, wanted in old:
-        path = FOLDER / name / FILE
+    for path, wanted in old:
         if options.check:
             print(f"{path.relative_to(paths.ROOT)} is not what koppel.library says: run scripts/scenes")
         else:

@@ -17,6 +17,8 @@ from .definition import Component, Connection, Ref, Scene, Settings
 from .errors import SceneError
 
 FILE = "SystemStructure.ssd"
+#: Name of the parameter sets.
+SET = "start"
 NAMESPACES = {
     "xmlns:ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
     "xmlns:ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
@@ -99,7 +101,8 @@ def _component(scene: Scene, component: Component) -> _Element:
         ordered = [name for name in variables if name in component.values]
         parameters = [_parameter(component, name) for name in ordered]
         inside = [_Element("ssv:Parameters", None, parameters)]
-        parameter_set = _Element("ssv:ParameterSet", {"version": "1.0", "name": component.name}, inside)
+        # one name for all: hosts that apply parameter sets by name apply the whole scene's
+        parameter_set = _Element("ssv:ParameterSet", {"version": "1.0", "name": SET}, inside)
         for tag in ("ssd:ParameterValues", "ssd:ParameterBinding", "ssd:ParameterBindings"):
             parameter_set = _Element(tag, None, [parameter_set])
         children.append(parameter_set)

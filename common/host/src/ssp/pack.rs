@@ -10,18 +10,23 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use super::{Package, SspError, outside_reference};
 
-/// Packs a folder with its FMUs and its reference results; the result lists the entries.
+/// Packs a folder with the FMUs of all its structures and its reference results; the result lists the entries.
 ///
 /// # Errors
 /// A scene that cannot be read, an FMU that is missing, an archive that cannot be written.
 pub fn pack(folder: &Path, fmus: &Path, references: &Path, output: &Path) -> Result<Vec<String>, SspError> {
-    let package = Package::open(folder)?;
+    let mut package = Package::open(folder)?;
     let system = package.system()?;
     let mut files = BTreeMap::new();
     self::files(folder, "", &mut files)?;
-    for component in &system.components {
-        let fmu = package.fmu(&component.source, fmus)?;
-        files.insert(component.source.clone(), fmu.path().to_owned());
+    let variants: Vec<String> =
+        files.keys().filter(|name| name.ends_with(".ssd") && !name.contains('/')).cloned().collect();
+    for structure in variants {
+        package.choose(&structure);
+        for component in package.system()?.components {
+            let fmu = package.fmu(&component.source, fmus)?;
+            files.insert(component.source, fmu.path().to_owned());
+        }
     }
     if let Some(file) = &system.settings.reference {
         let outside = outside_reference(references, file);
