@@ -30,7 +30,7 @@ pub struct Instance<M: Model> {
     /// Working memory of a step: the course of the inputs, and their values inside it
     pub(crate) polynomials: Polynomials,
     pub(crate) moving: Vec<f64>,
-    warnings: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 impl<M: Model> Default for Instance<M> {

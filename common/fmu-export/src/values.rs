@@ -211,5 +211,5 @@ fn in_range(entry: &Entry, value: f64) -> bool {
         #[allow(clippy::cast_precision_loss, reason = "items are small")]
         return t.items.iter().any(|i| i.value as f64 == value);
     }
-    value.is_finite() && value >= entry.min && value <= entry.max
+    entry.any || entry.or == Some(value) || value.is_finite() && value >= entry.min && value <= entry.max
 }

@@ -15,6 +15,18 @@ pub enum EvaluationError {
         /// Its smallest usable value
         limit: f64,
     },
+    /// An input that the equations have no value for, although each number by itself is in its range.
+    #[error("{variable} {problem}: {value:.6e}; allowed: {allowed}")]
+    Input {
+        /// Name of the input or its group
+        variable: &'static str,
+        /// What is wrong
+        problem: &'static str,
+        /// The value that shows it
+        value: f64,
+        /// What would be accepted
+        allowed: &'static str,
+    },
     /// The inertia of an element admits no unique motion.
     #[error("{element}: {source}")]
     Inertia {
@@ -42,6 +54,16 @@ pub enum ParameterError {
         reason: String,
         /// What would be accepted
         allowed: String,
+    },
+    /// A file that a parameter names.
+    #[error("{variable} = \"{file}\" is refused: {problem}")]
+    File {
+        /// Name of the parameter
+        variable: &'static str,
+        /// The file
+        file: String,
+        /// What is wrong with it, with value and allowed range
+        problem: String,
     },
     /// The equations have no value at the start.
     #[error("no consistent start: {0}")]

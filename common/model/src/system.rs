@@ -15,6 +15,20 @@ pub struct Experiment {
     pub step: f64,
 }
 
+/// The first states follow `y' = A y + b + c sin(omega t + phase)`, with `A` constant as long as inertias at the ports are
+/// and `b` linear in the inputs; the other states are integrals of these.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linear<const N: usize> {
+    /// Number of these states
+    pub states: usize,
+    /// c
+    pub amplitude: [f64; N],
+    /// omega [rad/s]
+    pub omega: f64,
+    /// Phase at t = 0 [rad]
+    pub phase: f64,
+}
+
 /// Output variables that are computed together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Group {
@@ -48,6 +62,16 @@ pub trait Model: Clone + Sized + 'static {
     const MODEL_EXCHANGE: bool = true;
     /// Inputs may follow polynomials inside a step (`port.*`); false: always held
     const PORT_TREATMENT: bool = true;
+    /// Numbers of `solver.method` on offer
+    const METHODS: &'static [i64] = &[1, 2, 3, 4, 5, 6];
+    /// Its start value
+    const METHOD: i64 = 2;
+    /// Start value of `solver.step` [s]
+    const STEP: f64 = 1e-3;
+    /// Start value of `solver.rtol`
+    const RTOL: f64 = 1e-6;
+    /// Start value of `solver.atol`
+    const ATOL: f64 = 1e-9;
     /// Names of the event indicators; a system with fewer uses the first ones
     const INDICATORS: &'static [&'static str] = &[];
     /// Constants of a run
@@ -82,6 +106,12 @@ pub trait Model: Clone + Sized + 'static {
     /// Cases that are allowed but probably not meant, as log messages.
     fn warnings(&self) -> Vec<String> {
         Vec::new()
+    }
+
+    /// What a step has met that is allowed but probably not meant, as a log message; from the discrete states before and
+    /// after it.
+    fn notice(_before: &Self::Discrete, _after: &Self::Discrete) -> Option<String> {
+        None
     }
 
     /// Run a job on the system that the parameters have chosen.
@@ -120,6 +150,17 @@ pub trait System<const N: usize, const Z: usize> {
     fn begin(
         &self,
         _x: &[f64; N],
+        _u: &<Self::Model as Model>::Inputs<f64>,
+        d: &<Self::Model as Model>::Discrete,
+    ) -> <Self::Model as Model>::Discrete {
+        *d
+    }
+
+    /// Discrete states at the start of a communication step under its inputs; may change `x`, e.g. bring a coordinate
+    /// onto the stop at which it rests.
+    fn settle(
+        &self,
+        _x: &mut [f64; N],
         _u: &<Self::Model as Model>::Inputs<f64>,
         d: &<Self::Model as Model>::Discrete,
     ) -> <Self::Model as Model>::Discrete {
@@ -200,6 +241,15 @@ pub trait System<const N: usize, const Z: usize> {
     /// See [`System::rates`].
     fn project(&self, _t: f64, _x: &mut [f64; N]) -> Result<bool, EvaluationError> {
         Ok(false)
+    }
+
+    /// How the equations are linear now, for `solver.method = exact`; otherwise another method takes the step.
+    fn linear(
+        &self,
+        _u: &<Self::Model as Model>::Inputs<f64>,
+        _d: &<Self::Model as Model>::Discrete,
+    ) -> Option<Linear<N>> {
+        None
     }
 
     /// How far orientations are off their manifold (unit quaternions, unit vectors).

@@ -44,6 +44,8 @@ pub enum Causality {
     Inherit,
     /// Constant of a run, given by the user
     Parameter,
+    /// Constant of a run, computed from parameters
+    CalculatedParameter,
     /// Given by other systems
     Input,
     /// Computed, meant for others
@@ -109,6 +111,10 @@ pub struct Entry {
     pub min: f64,
     /// Largest allowed value
     pub max: f64,
+    /// A value out of the range that is allowed too: it stands for another source of the value
+    pub or: Option<f64>,
+    /// Any value may be set, also one that is not finite
+    pub any: bool,
     /// Typical magnitude
     pub nominal: f64,
     /// Inputs and states that the value depends on directly: names, groups by prefix (`P.F`), or the
@@ -154,6 +160,10 @@ pub struct Attributes {
     pub min: Option<f64>,
     /// Largest allowed value
     pub max: Option<f64>,
+    /// A value out of the range that is allowed too
+    pub or: Option<f64>,
+    /// Any value may be set, also one that is not finite
+    pub any: bool,
     /// Typical magnitude
     pub nominal: Option<f64>,
     /// Inputs and states that the value depends on directly: none, one list for all, or one per component
@@ -195,6 +205,8 @@ impl Entry {
             start: 0.0,
             min: f64::NEG_INFINITY,
             max: f64::INFINITY,
+            or: None,
+            any: false,
             nominal: 1.0,
             depends: &[],
             rate: None,
@@ -236,7 +248,7 @@ impl Entry {
             || !matches!(self.kind, Kind::Float64) && matches!(self.causality, Causality::Local)
         {
             self.variability = Variability::Discrete;
-        } else if matches!(self.causality, Causality::Parameter)
+        } else if matches!(self.causality, Causality::Parameter | Causality::CalculatedParameter)
             && matches!(self.variability, Variability::Continuous)
         {
             self.variability = Variability::Fixed;
@@ -258,6 +270,10 @@ impl Entry {
         if let Some(max) = a.max {
             self.max = max;
         }
+        if a.or.is_some() {
+            self.or = a.or;
+        }
+        self.any |= a.any;
         if let Some(nominal) = a.nominal {
             self.nominal = nominal;
         }
