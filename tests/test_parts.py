@@ -290,6 +290,104 @@ def test_oscillator_at_resonance_has_the_amplitude_of_the_closed_form(fmu):
     assert np.abs(balance).max() <= 1e-8 * result["energy.supplied"][-1]
 
 
+def resonance(t):
+    """Displacement and velocity of the default oscillator from rest under its drive, in resonance (k = m omega^2)."""
+    m, k, c, F, w = 100.0, 15791.367041742973, 25.132741228718345, 50.0, 4.0 * np.pi
+    delta = c / (2.0 * m)
+    nu = np.sqrt(k / m - delta**2)
+    X, decay = F / (c * w), np.exp(-delta * t)
+    s = X * (decay * (np.cos(nu * t) + delta / nu * np.sin(nu * t)) - np.cos(w * t))
+    v = X * (w * np.sin(w * t) - decay * (k / m) / nu * np.sin(nu * t))
+    return s, v, X
+
+
+@pytest.mark.parametrize(("H", "step"), [(0.01, 1e-3), (0.01, 1.0), (1.0, 1.0), (10.0, 50.0)])
+def test_exact_steps_of_the_oscillator_have_no_error(fmu, H, step):
+    """The default method, at any step: closed form to rounding, work of the drive = heat + stored energy."""
+    outputs = ["s[1]", "v[1]", *(f"energy.{part}" for part in ("kinetic", "potential", "dissipated", "supplied"))]
+    result = fmu("primary_oscillator").run({"solver.step": step}, H=H, stop=50.0, outputs=outputs)
+    s, v, X = resonance(result.t)
+    assert np.abs(result["s[1]"] - s).max() <= 2e-12 * X
+    assert np.abs(result["v[1]"] - v).max() <= 2e-12 * X * 4.0 * np.pi
+    kinetic, potential, dissipated, supplied = result.values[:, 2:].T
+    assert np.abs(kinetic + potential + dissipated - supplied).max() <= 1e-10 * supplied[-1]
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("spatial", [False, True])
+def test_exact_steps_follow_moving_inputs(fmu, spatial, order):
+    """Two masses on a base that shakes, with load and inertia at the port: as dop853 at 1e-13 under the same inputs."""
+    names = {"A.r.z": 1.0, "A.v.z": 0.0, "A.a.z": 0.0, "P.F.z": 0.0, "P.M.zz": 7.0} if spatial else {
+        "A.s": 1.0, "A.v": 0.0, "A.a": 0.0, "P.F": 0.0, "P.M": 7.0
+    }  # fmt: skip
+    base = {"dof": 2, "use.base": True, "root.mass": 3.0, "port.kind": 2 if spatial else 1, "port.order": order, **names}
+    position, velocity, acceleration, force, _ = names
+    ends = {}
+    for method, extra in ((7, {}), (4, {"solver.rtol": 1e-13, "solver.atol": 1e-15})):
+        with fmu("primary_oscillator").instantiate() as instance:
+            instance.initialise({**base, "solver.method": method, "solver.step": 0.02, **extra})
+            for i in range(100):
+                t = 0.02 * i
+                shake = {
+                    position: 1.0 + 0.1 * np.sin(3.0 * t),
+                    velocity: 0.3 * np.cos(3.0 * t),
+                    acceleration: -0.9 * np.sin(3.0 * t),
+                }
+                instance.set({**shake, force: 20.0 * np.cos(5.0 * t)})
+                instance.step(t, 0.02)
+            ends[method] = instance.get_all(
+                ["s[1]", "v[1]", "s[2]", "v[2]", "energy.dissipated", "energy.supplied", "energy.port"]
+            )
+    for name, value in ends[4].items():
+        assert ends[7][name] == pytest.approx(value, rel=1e-10, abs=1e-11), name
+
+
+def test_a_sweep_and_a_moving_inertia_take_steps_of_dop853(fmu):
+    """Not linear with constant coefficients: `exact` hands these steps over, and counts what they cost."""
+    counts = {}
+    for name, start in {"plain": {}, "sweep": {"drive.sweep": 0.5}}.items():
+        tight = {**start, "solver.rtol": 1e-12, "solver.atol": 1e-14}
+        exact = fmu("primary_oscillator").run(tight, H=0.1, stop=5.0, outputs=["s[1]"])
+        other = fmu("primary_oscillator").run({**tight, "solver.method": 4}, H=0.1, stop=5.0, outputs=["s[1]"])
+        assert np.abs(exact["s[1]"] - other["s[1]"]).max() <= 1e-11
+        counts[name] = [result.counts["solver.rhs_evaluations"] for result in (exact, other)]
+    assert counts["sweep"][0] == counts["sweep"][1]
+    assert counts["plain"][0] != counts["plain"][1]
+
+    def run(method):
+        with fmu("primary_oscillator").instantiate() as instance:
+            instance.initialise({"solver.method": method, "solver.rtol": 1e-12, "solver.atol": 1e-14})
+            for i in range(20):
+                instance.set({"P.M": 10.0 + i})
+                instance.step(0.1 * i, 0.1)
+            return instance.get_all(["s[1]"])["s[1]"], instance.get("solver.rhs_evaluations")
+
+    (exact, evaluations), (other, all_evaluations) = run(7), run(4)
+    assert exact == pytest.approx(other, abs=1e-12)
+    # the first step has a constant inertia: 100 parts of 7 evaluations; all 20 would take 14000
+    assert 700 < evaluations < 700 + all_evaluations
+
+
+@pytest.mark.parametrize(
+    "extreme", [{"stiffness[1]": 1e12}, {"damping[1]": 0.0}, {"stiffness[1]": 0.0, "damping[1]": 0.0}, {"mass[1]": 1e-6}]
+)
+def test_extreme_oscillators_keep_the_energy_law(fmu, extreme):
+    outputs = [f"energy.{part}" for part in ("kinetic", "potential", "dissipated", "supplied")]
+    result = fmu("primary_oscillator").run({**extreme, "s[1].start": 1e-3}, H=0.01, stop=1.0, outputs=outputs)
+    kinetic, potential, dissipated, supplied = result.values.T
+    scale = max(np.abs(result.values).max(), 1e-30)
+    assert np.isfinite(result.values).all()
+    assert np.abs(kinetic + potential + dissipated - supplied - potential[0]).max() <= 1e-8 * scale
+
+
+def test_what_exact_cannot_resolve_is_discarded_with_the_reason(fmu):
+    """1e12 N s/m on 100 kg: a mode of 1e10 1/s would need 1e8 parts of a step of 10 ms."""
+    with fmu("primary_oscillator").instantiate() as instance:
+        instance.initialise({"damping[1]": 1e12})
+        outcome = instance.try_step(0.0, 0.01)
+        assert outcome.status == Status.DISCARD and "evaluations" in outcome.text, outcome.text
+
+
 @pytest.mark.parametrize(
     ("start", "named"),
     [

@@ -138,12 +138,15 @@ pub enum Fault {
     },
     /// A method for other systems than this one.
     #[error(
-        "solver.method = {name} ({method}) is for linear systems, this one is not; allowed: heun (1), rk4 (2), dopri5 (3), dop853 (4), rodas4 (5), radau5 (6)",
-        name = method_name(*method)
+        "solver.method = {} is not offered by this FMU; allowed: {}",
+        method_name(*method),
+        offered.iter().map(|m| method_name(*m)).collect::<Vec<_>>().join(", ")
     )]
     MethodNotOffered {
         /// Number of the method
         method: i64,
+        /// Those on offer
+        offered: &'static [i64],
     },
     /// Solver settings.
     #[error(transparent)]
@@ -244,12 +247,14 @@ pub enum Fault {
     },
 }
 
-fn method_name(number: i64) -> &'static str {
+/// Name and number of a method.
+fn method_name(number: i64) -> String {
     use model::{Kind, Variables};
     let Kind::Enumeration(methods) = <SolverMethod as Variables<f64>>::TABLE[0].kind else {
-        return "";
+        return number.to_string();
     };
-    methods.items.iter().find(|i| i.value == number).map_or("unknown", |i| i.name)
+    let name = methods.items.iter().find(|i| i.value == number).map_or("unknown", |i| i.name);
+    format!("{name} ({number})")
 }
 
 impl Fault {

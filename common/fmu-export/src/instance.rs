@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use integrators::{Solver, Statistics};
+use integrators::{Method, Solver, Statistics};
 use model::{Kind, Model, ParameterError, Variability, Variables};
 use num_dual::Dual64;
 
 use crate::built::Built;
 use crate::inputs::{Channels, Polynomials};
-use crate::jobs::{Begin, Evaluate, EventIndicators, Rates, Start};
+use crate::jobs::{Begin, Evaluate, EventIndicators, LinearCache, PrepareLinear, Rates, Start};
 use crate::phase::{Interface, Phase, Rule};
 use crate::state::State;
 use crate::table::{ALL_PARTS, Layout, Part, Table, Variable};
@@ -30,6 +30,8 @@ pub struct Instance<M: Model> {
     /// Working memory of a step: the course of the inputs, and their values inside it
     pub(crate) polynomials: Polynomials,
     pub(crate) moving: Vec<f64>,
+    /// The same for the method `exact`
+    pub(crate) linear: LinearCache,
     pub(crate) warnings: Vec<String>,
 }
 
@@ -61,6 +63,7 @@ impl<M: Model> Instance<M> {
             dual_states: Vec::new(),
             polynomials: Polynomials::new(&channels),
             moving: vec![0.0; channels.count()],
+            linear: None,
             channels,
             table,
             state,
@@ -189,7 +192,7 @@ impl<M: Model> Instance<M> {
             None
         } else {
             let solver = SolverParameters::load(&self.state.values[Layout::<M>::SOLVER]);
-            Some(Solver::new(solver.settings()?)?)
+            Some(Solver::new(solver.settings(M::METHODS)?)?)
         };
         self.port()?;
         self.assemble()?;
@@ -200,6 +203,9 @@ impl<M: Model> Instance<M> {
         })?;
         if let Some(model) = &self.state.model {
             self.warnings = model.warnings();
+            if solver.is_some_and(|solver| solver.settings().method == Method::Exact) {
+                self.linear = model.with_system(PrepareLinear);
+            }
         }
         let State { unused, values, .. } = &mut self.state;
         for (unused, state) in unused.iter_mut().zip(&self.table.states) {

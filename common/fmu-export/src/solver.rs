@@ -61,8 +61,12 @@ impl SolverParameters {
     /// Settings of the integrator.
     ///
     /// # Errors
-    /// [`Fault::MethodNotOffered`] for `exact`: the models are not linear.
-    pub fn settings(&self) -> Result<Settings, Fault> {
+    /// [`Fault::MethodNotOffered`] for a method that the model does not offer.
+    pub fn settings(&self, offered: &'static [i64]) -> Result<Settings, Fault> {
+        let number = self.method as i64;
+        if !offered.contains(&number) {
+            return Err(Fault::MethodNotOffered { method: number, offered });
+        }
         let method = match self.method {
             SolverMethod::Heun => Method::Heun,
             SolverMethod::Rk4 => Method::Rk4,
@@ -70,7 +74,7 @@ impl SolverParameters {
             SolverMethod::Dop853 => Method::Dop853,
             SolverMethod::Rodas4 => Method::Rodas4,
             SolverMethod::Radau5 => Method::Radau5,
-            other @ SolverMethod::Exact => return Err(Fault::MethodNotOffered { method: other as i64 }),
+            SolverMethod::Exact => Method::Exact,
         };
         let Self { step, rtol, atol, .. } = *self;
         Ok(Settings { method, step, rtol, atol })

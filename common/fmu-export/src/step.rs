@@ -138,9 +138,11 @@ impl<M: Model> Instance<M> {
         let h = solver.settings().inner_step(step);
         let fixed = !solver.settings().method.is_adaptive();
         let leave_events = *interface == Interface::CoSimulationWithEvents;
+        let before = *discrete;
         let event = model.with_system(Step {
             from,
             to,
+            interval: step,
             u: given,
             course,
             leave_events,
@@ -150,8 +152,10 @@ impl<M: Model> Instance<M> {
             d: discrete,
             solver,
             statistics,
+            linear: &mut self.linear,
         })?;
         *guarded = h;
+        self.warnings.extend(M::notice(&before, discrete));
         SolverCounters::from(*statistics).store(&mut values[Layout::<M>::COUNTERS]);
         self.finish_inputs(span, settled, forget);
         self.state.values[0] = to;

@@ -170,6 +170,13 @@ impl Table {
         let plain = |name: String, entry: Entry| Variable { name, entry, derivative_of: None };
         let mut variables: Vec<_> =
             Layout::<M>::SECTIONS.into_iter().flatten().map(|entry| plain(entry.name(), *entry)).collect();
+        #[allow(clippy::cast_precision_loss, reason = "a small number")]
+        {
+            let starts = [M::METHOD as f64, M::STEP, M::RTOL, M::ATOL];
+            for (variable, start) in variables[Layout::<M>::SOLVER].iter_mut().zip(starts) {
+                variable.entry.start = start;
+            }
+        }
         let mut states = Vec::new();
         if M::MODEL_EXCHANGE {
             states.extend((0..variables.len()).filter(|i| variables[*i].entry.rate.is_some()));

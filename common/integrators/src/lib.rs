@@ -12,7 +12,7 @@
 //! | [`Dopri5`](Method::Dopri5), [`Dop853`](Method::Dop853) | 5, 8 | adaptive | moderate and high accuracy |
 //! | [`Rodas4`](Method::Rodas4) | 4 | adaptive | stiff, moderate accuracy, no iteration |
 //! | [`Radau5`](Method::Radau5) | 5 | adaptive | stiff, any accuracy |
-//! | [`Exact`](Method::Exact) | exact | fixed | linear systems ([`Ode::linear`]), see [`Transition`] |
+//! | [`Exact`](Method::Exact) | exact | fixed | linear systems ([`Ode::linear`]), see [`Transition`]; with moving inputs [`LinearSteps`] |
 //!
 //! Sources: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. 1993 (methods,
 //! step size control, dense output); E. Hairer, G. Wanner, *II*, 2nd ed. 1996 (stiff methods); I. F. D. Oliveira,
@@ -64,6 +64,7 @@ mod explicit;
 mod first_step;
 mod fixed;
 mod heun;
+mod linear;
 mod lu;
 mod matrix;
 mod method;
@@ -87,6 +88,7 @@ pub use dynamic::{DynamicOde, ExplicitSolver, NotExplicit};
 pub use error::{SettingsError, StepError};
 pub use events::{Crossing, Indicators, Reached};
 pub use exact::Transition;
+pub use linear::{Harmonic, LinearOde, LinearSteps};
 pub use method::Method;
 pub use ode::{Jacobian, Ode};
 pub use run::MAX_EVALUATIONS;

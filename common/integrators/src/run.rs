@@ -81,7 +81,7 @@ impl<const N: usize> Run<N> {
 /// A state that dies away would stay at the smallest subnormal number (5e-324 times 0.9 is rounded to 5e-324), and
 /// processors that handle such numbers in microcode take many times as long for every operation on them.
 #[inline]
-fn clear_subnormal<const N: usize>(x: &mut [f64; N]) -> bool {
+pub(crate) fn clear_subnormal<const N: usize>(x: &mut [f64; N]) -> bool {
     let mut found = false;
     for x in x {
         if x.is_subnormal() {

@@ -56,6 +56,12 @@ impl Solver {
         &self.settings
     }
 
+    /// A solver with the same tolerances, step size and memory, and another method.
+    #[must_use]
+    pub fn with_method(&self, method: Method) -> Self {
+        Self { settings: Settings { method, ..self.settings }, memory: self.memory }
+    }
+
     /// For a saved state.
     #[must_use]
     pub fn memory(&self) -> Memory {

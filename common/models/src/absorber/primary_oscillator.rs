@@ -2,7 +2,7 @@
 
 use mechanics::{Load, Scalar};
 use model::{
-    Dense, Documentation, EvaluationError, Experiment, Matrix, Model, ParameterError, Spectrum,
+    Dense, Documentation, EvaluationError, Experiment, Linear, Matrix, Model, ParameterError, Spectrum,
     SymmetricTensor, System, Vector3, Visitor,
 };
 use serde::{Deserialize, Serialize};
@@ -225,6 +225,8 @@ impl Model for PrimaryOscillator {
             ("Energies", ["energy.supplied", "energy.dissipated", "energy.kinetic"])
         ]
     );
+    const METHODS: &'static [i64] = &[1, 2, 3, 4, 5, 6, 7];
+    const METHOD: i64 = 7;
     type Parameters = Parameters;
     type Inputs<S: Scalar> = Inputs<S>;
     type Motion<S: Scalar> = Motion<S>;
@@ -431,6 +433,18 @@ where
         }
         let [dissipated, supplied, port] = [0, 1, 2].map(|i| x[2 * self.dof() + i]);
         Ok(Energy { kinetic, potential, dissipated, supplied, port })
+    }
+
+    fn linear(&self, u: &Inputs<f64>, _d: &Base) -> Option<Linear<X>> {
+        let Parameters { amplitude, omega_start: omega, sweep, phase, M, .. } = &self.p;
+        if !sweep.vanishes() {
+            return None;
+        }
+        let driven = usize::from(self.p.drive_mass == 2);
+        let carried = if driven == self.port { self.carried(u).mu } else { 0.0 };
+        let mut c = [0.0; X];
+        c[2 * driven + 1] = amplitude / (M[driven] + carried);
+        Some(Linear { states: 2 * self.dof(), amplitude: c, omega: *omega, phase: *phase })
     }
 
     fn state_names(&self) -> [String; X] {
