@@ -17,9 +17,9 @@ def open_instance(fmu, way):
 
 
 def moved(fmu):
-    """Inputs that move: all continuous ones except masses."""
+    """Inputs that move: all continuous ones of any sign except masses."""
     inputs = [fmu.variable(name) for name in fmu.names("input")]
-    return [v.name for v in inputs if v.variability == "continuous" and ".M." not in v.name]
+    return [v.name for v in inputs if v.variability == "continuous" and ".M." not in v.name and v.min is None]
 
 
 def tunable(fmu):

@@ -89,6 +89,7 @@ PORTS = {
     "link3": {"B": "follower", "C": "leader", "P": "leader"},
     "load": {"A": "follower"},
     "primary_oscillator": {"A": "follower", "P": "leader"},
+    "rvdp_absorber": {"A": "follower", "P": "follower"},
     "strut_link": {"D": "follower", "C": "leader", "T": "force"},
 }
 VECTOR = ("x", "y", "z")
@@ -96,7 +97,7 @@ SYMMETRIC = ("xx", "xy", "xz", "yy", "yz", "zz")
 MEMBERS = [f"{quantity}.{axis}" for quantity in "rvaF" for axis in VECTOR] + [f"M.{axes}" for axes in SYMMETRIC]
 SCALAR_MEMBERS = ["s", "v", "a", "F", "M"]
 #: Ports in one coordinate, and those that have both forms.
-SCALAR, BOTH = {("guide", "H")}, {("primary_oscillator", "A"), ("primary_oscillator", "P")}
+SCALAR, BOTH = {("guide", "H"), ("rvdp_absorber", "P")}, {("primary_oscillator", "A"), ("primary_oscillator", "P")}
 
 
 def terminals(fmu):

@@ -21,16 +21,21 @@ ROAD = Wishbone(
 )
 
 
-def compare(table, reference):
-    """Largest difference per column, with the limit for its unit."""
+def compare(table, reference, stiffness=0.0):
+    """Largest difference per column, with the limit for its unit.
+
+    `stiffness` of a bushing [N/m]: its force is the difference of two positions of 1 m, and processors that add in
+    another order differ in the last bit of these."""
     from koppel.reference import COLUMNS, kind_of
+
+    limits = {**LIMITS, "N": max(LIMITS["N"], stiffness * np.finfo(float).eps)}
 
     for i, column in enumerate(Wishbone.COLUMNS):
         if column in ("t", "theta1_ddot"):
             continue
         _, unit = kind_of(COLUMNS.get(column, column))
         difference = np.abs(table[:, i] - reference.values[: len(table), i]).max()
-        assert difference < LIMITS[unit], f"{column}: {difference:.2e} {unit}, limit {LIMITS[unit]:.0e}"
+        assert difference < limits[unit], f"{column}: {difference:.2e} {unit}, limit {limits[unit]:.0e}"
 
 
 @pytest.mark.parametrize(("name", "model"), [("wishbone_paper", PAPER), ("wishbone_road", ROAD)])
@@ -46,7 +51,7 @@ def test_stored_oracle_files_come_from_the_oracle(name):
     case = CASES[name]
     assert np.array_equal(reference.t, case.times())
     rows = 2 if case.model.bushing else 12
-    compare(case.table(rows), reference)
+    compare(case.table(rows), reference, case.model.bushing[0] if case.model.bushing else 0.0)
 
 
 @pytest.mark.parametrize("name", CASES)

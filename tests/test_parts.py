@@ -1,5 +1,6 @@
 """Small parts (`load`, `guide`, `bushing`) and `primary_oscillator`, each against equations written here."""
 
+import closed_forms
 import numpy as np
 import pytest
 from koppel import Status, scenes
@@ -290,23 +291,13 @@ def test_oscillator_at_resonance_has_the_amplitude_of_the_closed_form(fmu):
     assert np.abs(balance).max() <= 1e-8 * result["energy.supplied"][-1]
 
 
-def resonance(t):
-    """Displacement and velocity of the default oscillator from rest under its drive, in resonance (k = m omega^2)."""
-    m, k, c, F, w = 100.0, 15791.367041742973, 25.132741228718345, 50.0, 4.0 * np.pi
-    delta = c / (2.0 * m)
-    nu = np.sqrt(k / m - delta**2)
-    X, decay = F / (c * w), np.exp(-delta * t)
-    s = X * (decay * (np.cos(nu * t) + delta / nu * np.sin(nu * t)) - np.cos(w * t))
-    v = X * (w * np.sin(w * t) - decay * (k / m) / nu * np.sin(nu * t))
-    return s, v, X
-
-
 @pytest.mark.parametrize(("H", "step"), [(0.01, 1e-3), (0.01, 1.0), (1.0, 1.0), (10.0, 50.0)])
 def test_exact_steps_of_the_oscillator_have_no_error(fmu, H, step):
     """The default method, at any step: closed form to rounding, work of the drive = heat + stored energy."""
     outputs = ["s[1]", "v[1]", *(f"energy.{part}" for part in ("kinetic", "potential", "dissipated", "supplied"))]
     result = fmu("primary_oscillator").run({"solver.step": step}, H=H, stop=50.0, outputs=outputs)
-    s, v, X = resonance(result.t)
+    s, v = closed_forms.resonance(result.t)
+    X = closed_forms.X
     assert np.abs(result["s[1]"] - s).max() <= 2e-12 * X
     assert np.abs(result["v[1]"] - v).max() <= 2e-12 * X * 4.0 * np.pi
     kinetic, potential, dissipated, supplied = result.values[:, 2:].T

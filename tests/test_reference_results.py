@@ -3,6 +3,7 @@ would make it."""
 
 import zipfile
 
+import closed_forms
 import numpy as np
 import pytest
 from koppel import Reference, Result, paths
@@ -192,16 +193,10 @@ def test_bushing(packed):
 def test_primary_oscillator(packed):
     """Matrix exponential of mass, spring, damper and a sine as two more states, with the powers integrated by scipy."""
     result = packed("primary_oscillator")
-    m, k, c, F, w = 100.0, 15791.367041742973, 25.132741228718345, 50.0, 4.0 * np.pi
+    m, k, c, F, w = closed_forms.M, closed_forms.K, closed_forms.C, closed_forms.F, closed_forms.OMEGA
     t = result.t
-    # particular solution in resonance (k = m w^2): -F/(c w) cos(w t), and the decay that starts it from rest
     assert k == pytest.approx(m * w * w, rel=1e-14)
-    delta = c / (2.0 * m)
-    nu = np.sqrt(k / m - delta**2)
-    decay = np.exp(-delta * t)
-    X = F / (c * w)
-    s = X * (decay * (np.cos(nu * t) + delta / nu * np.sin(nu * t)) - np.cos(w * t))
-    v = X * (w * np.sin(w * t) - decay * (k / m) / nu * np.sin(nu * t))
+    s, v = closed_forms.resonance(t)
     a = (F * np.sin(w * t) - c * v - k * s) / m
     expected = {"s[1]": s, "v[1]": v, "P.s": s, "P.v": v, "P.a": a, "drive.omega": w}
     expected |= {"energy.kinetic": 0.5 * m * v * v, "energy.potential": 0.5 * k * s * s}
@@ -210,9 +205,31 @@ def test_primary_oscillator(packed):
     balance = result["energy.supplied"] - result["energy.dissipated"] - expected["energy.kinetic"]
     assert np.abs(balance - expected["energy.potential"]).max() <= 1e-9 * result["energy.supplied"][-1]
     at = np.linspace(0.0, 10.0, 200_001)
-    fine = X * (w * np.sin(w * at) - np.exp(-delta * at) * (k / m) / nu * np.sin(nu * at))
+    _, fine = closed_forms.resonance(at)
     heat = np.trapezoid(c * fine * fine, at)
     assert result["energy.dissipated"][-1] == pytest.approx(heat, rel=1e-7)
+
+
+def test_rvdp_absorber(packed):
+    """The absorber on a base at rest, with the powers of its damper and controller as two more states."""
+    result = packed("rvdp_absorber")
+    m, c, d, gamma, w, X = 5.0, 800.0, 2.5, 10.0, 4.0 * np.pi, 0.06332573977646111
+
+    def force(x, v):
+        return -0.5 * gamma * m * (v * v + w * w * (x * x - X * X)) * v - (m * w * w - c) * x + d * v
+
+    def rhs(_, state):
+        x, v = state[:2]
+        F = force(x, v)
+        return [v, (F - c * x - d * v) / m, d * v * v, F * v]
+
+    x, v, heat, work = solve_ivp(rhs, (0.0, result.t[-1]), [0.01, 0.0, 0.0, 0.0], t_eval=result.t, **TIGHT).y
+    F = force(x, v)
+    expected = {"x": x, "w": v, "control.F1": F, "control.power": F * v}
+    expected |= {name: c * x + d * v - F for name in ("P.F", "P.F0")}
+    expected |= {"energy.kinetic": 0.5 * m * v * v, "energy.potential": 0.5 * c * x * x}
+    expected |= {"energy.dissipated": heat, "energy.supplied": work}
+    assert compare(result, expected, 1e-9) == []
 
 
 # a run at default settings ----------------------------------------------------------------------------------------

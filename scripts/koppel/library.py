@@ -100,6 +100,66 @@ def double_wishbone_two_chain(scene: Scene):
     scene.configure(integrator="rk4", step=0.005)
 
 
+#: Structure of 100 kg at 2 Hz with 1 %, absorber of 5 kg; the force of 50 N acts at this frequency by default.
+_OMEGA = 4.0 * pi
+_STRUCTURE, _MASS, _FORCE = 100.0, 5.0, 50.0
+
+
+def absorber_on_oscillator(
+    scene: Scene,
+    absorber: str | None = "rvdp",
+    dof: int = 1,
+    omega: float | None = None,
+    told: bool = True,
+    force: float | None = None,
+    **values: Value,
+):
+    """A structure of one or two masses under a harmonic force, and what calms it: `rvdp` (controlled), `passive`
+    (tuned to the
+    drive), `den_hartog`, or None.
+
+    `omega`, `force`: of the drive, the absorber is designed for the default ones; `told`: the controller knows the
+    frequency.
+    `values`: further parameters of the absorber.
+    """
+    design = _OMEGA if dof == 1 else 15.0
+    drive = {"drive.omega_start": omega or design}
+    if dof == 1:
+        scene.add("primary", "primary_oscillator", **drive, **{"drive.amplitude": _FORCE if force is None else force})
+    else:
+        two = {"dof": 2, "mass[1]": 200.0, "stiffness[1]": 80000.0, "damping[1]": 60.0}
+        drive["drive.amplitude"] = 80.0 if force is None else force
+        scene.add("primary", "primary_oscillator", **two, **drive)
+    states = [f"primary.{name}[{i}]" for i in range(1, dof + 1) for name in "sv"]
+    if absorber is not None:
+        own = {"mass": _MASS} if dof == 1 else {"mass": 6.0, "control.gamma": 5.0, "control.amplitude": 0.08}
+        scene.add("absorber", "rvdp_absorber", **{**own, **_tuned(absorber, own["mass"], design), **values})
+        scene.connect("primary.P", "absorber.P")
+        if told:
+            scene.connect_signal("primary.drive.omega", "absorber.drive.omega")
+        else:
+            scene.set("absorber", **{"drive.omega": design})
+        states += [f"absorber.{name}" for name in ("x", "w", "control.F1", "control.power")]
+    scene.record(*states, interval=0.1)
+    scene.configure(stop=60.0)
+    scene.reference = f"extra/absorber/coupled_{dof}dof.csv"
+
+
+def _tuned(absorber: str, mass: float, omega: float) -> dict[str, Value]:
+    """Spring and damper of a kind of absorber for the structure of one mass with this frequency."""
+    if absorber == "rvdp":
+        return {"drive.omega": omega}
+    at_rest: dict[str, Value] = {"control.law": "off", "x.start": 0.0}
+    if absorber == "passive":
+        return {**at_rest, "stiffness": mass * omega**2}
+    if absorber != "den_hartog":
+        raise ValueError(f"absorber {absorber!r}: rvdp, passive, den_hartog or None")
+    mu = mass / _STRUCTURE
+    own = omega / (1.0 + mu)
+    zeta = (3.0 * mu / (8.0 * (1.0 + mu) ** 3)) ** 0.5
+    return {**at_rest, "stiffness": mass * own**2, "damping": 2.0 * zeta * mass * own}
+
+
 def _wishbone_run(scene: Scene, reference: str):
     names = [*_angles("lower"), "carrier.angle.psi", "carrier.angle_rate.psi", *_angles("upper")]
     scene.record(*names, "carrier.P.r.x", "carrier.P.r.z", interval=0.05)
@@ -112,7 +172,15 @@ def _angles(*components: str) -> list[str]:
 
 
 SCENES: dict[str, Callable[..., None]] = {
-    build.__name__: build for build in (two_mass, double_pendulum, four_bar, double_wishbone, double_wishbone_two_chain)
+    build.__name__: build
+    for build in (
+        two_mass,
+        double_pendulum,
+        four_bar,
+        double_wishbone,
+        double_wishbone_two_chain,
+        absorber_on_oscillator,
+    )
 }
 
 

@@ -58,6 +58,10 @@ KINDS = (
     (r"\.r\.", "position", "m"),
     (r"\.v\.", "velocity", "m/s"),
     (r"\.a\.", "acceleration", "m/s2"),
+    (r"(^|\.)x$", "position", "m"),
+    (r"(^|\.)w$", "velocity", "m/s"),
+    (r"(^|\.)(F|F1)$", "force", "N"),
+    (r"(^|\.)power$", "power", "W"),
     (r"^strut\.length", "length", "m"),
     (r"^energy\.", "energy", "J"),
 )

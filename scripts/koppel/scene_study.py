@@ -30,6 +30,7 @@ class Plan:
 
 _SMALL = Plan((10e-3, 5e-3, 2.5e-3, 1e-3, 0.5e-3, 0.1e-3), (10e-3, 5e-3, 2.5e-3))
 PLANS = {
+    "absorber_on_oscillator": Plan((10e-3, 5e-3, 2e-3, 1e-3, 0.5e-3), (10e-3, 5e-3, 2e-3), kept_stop=5.0),
     "two_mass": _SMALL,
     "double_pendulum": _SMALL,
     "four_bar": Plan((15e-3, 7.5e-3, 3.75e-3, 1.5e-3, 0.75e-3, 0.15e-3), (15e-3, 7.5e-3, 3.75e-3)),

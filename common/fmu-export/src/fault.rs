@@ -3,7 +3,8 @@
 use integrators::{SettingsError, StepError};
 use model::{EvaluationError, ParameterError};
 
-use crate::{Interface, SerialisedStateError, SolverMethod};
+use crate::solver::method_name;
+use crate::{Interface, SerialisedStateError};
 
 /// Status of a call, numbered as `fmi2Status` and `fmi3Status`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,8 +140,8 @@ pub enum Fault {
     /// A method for other systems than this one.
     #[error(
         "solver.method = {} is not offered by this FMU; allowed: {}",
-        method_name(*method),
-        offered.iter().map(|m| method_name(*m)).collect::<Vec<_>>().join(", ")
+        numbered(*method),
+        offered.iter().map(|m| numbered(*m)).collect::<Vec<_>>().join(", ")
     )]
     MethodNotOffered {
         /// Number of the method
@@ -239,6 +240,14 @@ pub enum Fault {
         /// Largest usable inner step
         largest: f64,
     },
+    /// What a part of an assembly says, with its name in the text.
+    #[error("{message}")]
+    Part {
+        /// The text
+        message: String,
+        /// What it means for the call
+        status: Status,
+    },
     /// A panic, caught.
     #[error("internal error, the instance is lost: {message}")]
     Panic {
@@ -248,13 +257,8 @@ pub enum Fault {
 }
 
 /// Name and number of a method.
-fn method_name(number: i64) -> String {
-    use model::{Kind, Variables};
-    let Kind::Enumeration(methods) = <SolverMethod as Variables<f64>>::TABLE[0].kind else {
-        return number.to_string();
-    };
-    let name = methods.items.iter().find(|i| i.value == number).map_or("unknown", |i| i.name);
-    format!("{name} ({number})")
+fn numbered(method: i64) -> String {
+    format!("{} ({method})", method_name(method))
 }
 
 impl Fault {
@@ -270,6 +274,7 @@ impl Fault {
             | Self::Evaluation { .. }
             | Self::OffManifold { .. }
             | Self::NotFinite { .. } => Status::Discard,
+            Self::Part { status, .. } => *status,
             Self::Panic { .. } => Status::Fatal,
             _ => Status::Error,
         }

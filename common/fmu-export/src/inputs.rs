@@ -12,10 +12,12 @@ mod polynomials;
 #[cfg(test)]
 mod tests;
 
-use model::{Enumeration, ParameterError, Variables};
+use model::{Enumeration, ParameterError, Variability, Variables};
 
-pub(crate) use history::History;
-pub(crate) use polynomials::{Polynomials, Span};
+use crate::Variable;
+
+pub use history::History;
+pub use polynomials::{Polynomials, Span};
 
 /// How inputs go on inside a step
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Enumeration)]
@@ -57,11 +59,14 @@ pub struct PortReset {
 
 impl PortParameters {
     /// All inputs keep their values.
-    pub(crate) const HOLD: Self =
+    pub const HOLD: Self =
         Self { inputs: InputTreatment::Hold, order: 0, integrate_motion: false, limit: 0.0 };
 
     /// The parameters themselves, if they fit together.
-    pub(crate) fn checked(self) -> Result<Self, ParameterError> {
+    ///
+    /// # Errors
+    /// An order that the treatment does not have.
+    pub fn checked(self) -> Result<Self, ParameterError> {
         let (low, high, name) = match self.inputs {
             InputTreatment::Hold => return Ok(self),
             InputTreatment::Extrapolate => (0, 2, "extrapolate"),
@@ -101,7 +106,7 @@ struct Bounds {
 
 /// What is known about the inputs of an FMU.
 #[derive(Debug, Clone)]
-pub(crate) struct Channels {
+pub struct Channels {
     count: usize,
     /// Continuous inputs
     continuous: Vec<(usize, Bounds)>,
@@ -109,6 +114,14 @@ pub(crate) struct Channels {
 }
 
 impl Channels {
+    /// Of the inputs among the variables of an FMU.
+    #[must_use]
+    pub fn of(inputs: &[Variable]) -> Self {
+        Self::new(inputs.iter().map(|Variable { name, entry: e, .. }| {
+            (name.as_str(), e.variability == Variability::Continuous, e.min, e.max, e.nominal)
+        }))
+    }
+
     /// From name, continuity, smallest, largest and nominal value of each input.
     pub(crate) fn new<'a>(inputs: impl Iterator<Item = (&'a str, bool, f64, f64, f64)>) -> Self {
         let inputs: Vec<_> = inputs.collect();
@@ -141,17 +154,19 @@ impl Channels {
     }
 
     /// Number of inputs.
-    pub(crate) fn count(&self) -> usize {
+    #[must_use]
+    pub fn count(&self) -> usize {
         self.count
     }
 
     /// True if positions and velocities may move by themselves.
-    pub(crate) fn moving(&self) -> bool {
+    #[must_use]
+    pub fn moving(&self) -> bool {
         !self.motions.is_empty()
     }
 
     /// Positions and velocities that are integrals of accelerations.
-    pub(crate) fn integrated(&self) -> impl Iterator<Item = usize> {
+    pub fn integrated(&self) -> impl Iterator<Item = usize> {
         self.motions.iter().flat_map(|m| [m.r, m.v])
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use integrators::{Method, Solver, Statistics};
-use model::{Kind, Model, ParameterError, Variability, Variables};
+use model::{Kind, Model, ParameterError, Variables};
 use num_dual::Dual64;
 
 use crate::built::Built;
@@ -12,10 +12,7 @@ use crate::jobs::{Begin, Evaluate, EventIndicators, LinearCache, PrepareLinear, 
 use crate::phase::{Interface, Phase, Rule};
 use crate::state::State;
 use crate::table::{ALL_PARTS, Layout, Part, Table, Variable};
-use crate::{Fault, SolverParameters};
-
-/// A host may miss the instance's time by this much (relative to max(1, |t|)).
-pub(crate) const SAME_TIME: f64 = 1e-9;
+use crate::{Fault, SolverParameters, times};
 
 /// An instance.
 #[derive(Debug)]
@@ -53,11 +50,7 @@ impl<M: Model> Instance<M> {
     pub fn with_interface(interface: Interface) -> Self {
         let table = Table::shared::<M>();
         let state = State::new(&table, interface);
-        let channels = Channels::new(table.variables[Layout::<M>::INPUTS].iter().map(|v| {
-            let e = &v.entry;
-            let continuous = e.variability == Variability::Continuous;
-            (v.name.as_str(), continuous, e.min, e.max, e.nominal)
-        }));
+        let channels = Channels::of(&table.variables[Layout::<M>::INPUTS]);
         Self {
             duals: vec![Dual64::from_re(0.0); table.variables.len()],
             dual_states: Vec::new(),
@@ -88,14 +81,7 @@ impl<M: Model> Instance<M> {
     /// [`Fault::WrongPhase`].
     #[inline]
     pub fn enter(&self, rule: &Rule) -> Result<(), Fault> {
-        let State { interface, phase, .. } = self.state;
-        if rule.allows(interface, phase) {
-            return Ok(());
-        }
-        Err(Fault::WrongPhase {
-            phase: format!("{phase:?} of {interface}"),
-            allowed: rule.allowed(interface),
-        })
+        rule.check(self.state.interface, self.state.phase)
     }
 
     /// The instance is lost.
@@ -105,10 +91,7 @@ impl<M: Model> Instance<M> {
 
     /// A variable by its value reference.
     pub(crate) fn variable(&self, reference: u32) -> Result<&Variable, Fault> {
-        self.table
-            .variables
-            .get(reference as usize)
-            .ok_or(Fault::UnknownReference { reference, count: self.table.variables.len() })
+        self.table.variable(reference)
     }
 
     /// Name of a type in the standard that the instance speaks.
@@ -122,18 +105,7 @@ impl<M: Model> Instance<M> {
     /// # Errors
     /// Times that make no sense.
     pub fn setup_experiment(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
-        if !start.is_finite() {
-            return Err(Fault::Argument { argument: "startTime", value: start, allowed: "finite".into() });
-        }
-        if let Some(stop) = stop
-            && !(stop.is_finite() && stop > start)
-        {
-            return Err(Fault::Argument {
-                argument: "stopTime",
-                value: stop,
-                allowed: format!("> {start} s, finite"),
-            });
-        }
+        times::experiment(start, stop)?;
         self.state.start_time = start;
         self.state.stop_time = stop;
         Ok(())

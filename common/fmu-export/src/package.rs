@@ -10,11 +10,12 @@ use model::Model;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-use crate::Standard;
-use crate::describe::model_description;
+use crate::describe::{describe, model_description};
 use crate::documentation::{DocumentationError, page};
 use crate::reference::{self, FOLDER};
+use crate::table::Table;
 use crate::terminals::terminals;
+use crate::{Profile, Standard};
 
 /// Everything that can go wrong while packing.
 #[derive(Debug, thiserror::Error)]
@@ -42,27 +43,29 @@ pub enum PackError {
 }
 
 /// Everything inside the archive: path and content, in any order.
-fn contents<M: Model>(
+fn contents(
+    profile: &Profile<'_>,
+    table: &Table,
     standard: Standard,
     library: &[u8],
     extension: &str,
 ) -> Result<Vec<(String, Vec<u8>)>, PackError> {
-    let binary = format!("binaries/{}/{}.{extension}", standard.platform(), M::NAME);
-    let documentation = M::DOCUMENTATION;
+    let binary = format!("binaries/{}/{}.{extension}", standard.platform(), profile.name);
+    let documentation = profile.documentation;
     let mut files = vec![
         (binary, library.to_vec()),
-        ("documentation/index.html".into(), page::<M>()?.into_bytes()),
-        ("documentation/fmi-ls-ref.txt".into(), reference::notes::<M>().into_bytes()),
+        ("documentation/index.html".into(), page(profile, table)?.into_bytes()),
+        ("documentation/fmi-ls-ref.txt".into(), reference::notes(profile).into_bytes()),
         ("documentation/licenses/license.spdx".into(), b"MIT OR Apache-2.0\n".to_vec()),
         ("documentation/licenses/LICENSE-APACHE".into(), include_bytes!("../../../LICENSE-APACHE").to_vec()),
         ("documentation/licenses/LICENSE-MIT".into(), include_bytes!("../../../LICENSE-MIT").to_vec()),
-        ("modelDescription.xml".into(), model_description::<M>(standard)?),
+        ("modelDescription.xml".into(), describe(profile, table, standard)?),
     ];
     let mut references = |name: String, content: Vec<u8>| files.push((format!("{FOLDER}/{name}"), content));
-    references("fmi-ls-manifest.xml".into(), reference::manifest::<M>()?);
-    references(reference::results_name::<M>(), documentation.reference.into());
+    references("fmi-ls-manifest.xml".into(), reference::manifest(profile)?);
+    references(reference::results_name(profile), documentation.reference.into());
     if let Some(inputs) = documentation.reference_inputs {
-        references(reference::inputs_name::<M>(), inputs.into());
+        references(reference::inputs_name(profile), inputs.into());
     }
     let icon = documentation.icon_png.to_vec();
     match standard {
@@ -70,7 +73,7 @@ fn contents<M: Model>(
         Standard::Fmi3 => files.extend([
             ("terminalsAndIcons/icon.png".into(), icon),
             ("terminalsAndIcons/icon.svg".into(), documentation.icon_svg.into()),
-            ("terminalsAndIcons/terminalsAndIcons.xml".into(), terminals::<M>()?),
+            ("terminalsAndIcons/terminalsAndIcons.xml".into(), terminals(table.variables())?),
         ]),
     }
     Ok(files)
@@ -81,7 +84,22 @@ fn contents<M: Model>(
 /// # Errors
 /// [`PackError`].
 pub fn archive<M: Model>(standard: Standard, library: &[u8], extension: &str) -> Result<Vec<u8>, PackError> {
-    let mut files = contents::<M>(standard, library, extension)?;
+    pack(&Profile::of::<M>(), &Table::new::<M>(), standard, (library, extension), Vec::new())
+}
+
+/// The archive of an FMU with further files, each with its path inside.
+///
+/// # Errors
+/// [`PackError`].
+pub fn pack(
+    profile: &Profile<'_>,
+    table: &Table,
+    standard: Standard,
+    (library, extension): (&[u8], &str),
+    further: Vec<(String, Vec<u8>)>,
+) -> Result<Vec<u8>, PackError> {
+    let mut files = contents(profile, table, standard, library, extension)?;
+    files.extend(further);
     files.sort(); // the same order wherever it is built
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)

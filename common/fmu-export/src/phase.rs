@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::Standard;
+use crate::{Fault, Standard};
 
 /// How an instance is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -44,7 +44,8 @@ impl Interface {
     }
 
     /// Where an instance stands after initialisation.
-    pub(crate) const fn after_initialization(self) -> Phase {
+    #[must_use]
+    pub const fn after_initialization(self) -> Phase {
         match self {
             CoSimulation | CoSimulation2 => StepMode,
             CoSimulationWithEvents | ModelExchange | ModelExchange2 => EventMode,
@@ -247,6 +248,21 @@ impl Rule {
     #[must_use]
     pub const fn allows(&self, interface: Interface, phase: Phase) -> bool {
         self.phases & phase as u8 != 0 && self.interfaces & interface as u8 != 0
+    }
+
+    /// Check that the function may be called in `phase`.
+    ///
+    /// # Errors
+    /// [`Fault::WrongPhase`].
+    #[inline]
+    pub fn check(&self, interface: Interface, phase: Phase) -> Result<(), Fault> {
+        if self.allows(interface, phase) {
+            return Ok(());
+        }
+        Err(Fault::WrongPhase {
+            phase: format!("{phase:?} of {interface}"),
+            allowed: self.allowed(interface),
+        })
     }
 
     /// Where the function may be called, for a message.

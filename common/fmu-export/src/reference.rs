@@ -3,10 +3,10 @@
 
 use std::io;
 
-use model::Model;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
 
+use crate::Profile;
 use crate::describe::number;
 
 /// Name of the layered standard.
@@ -15,26 +15,27 @@ const STANDARD: &str = "org.fmi-standard.fmi-ls-ref";
 pub(crate) const FOLDER: &str = "extra/org.fmi-standard.fmi-ls-ref";
 
 /// File of the results.
-pub(crate) fn results_name<M: Model>() -> String {
-    format!("{}_ref.csv", M::NAME)
+pub(crate) fn results_name(profile: &Profile<'_>) -> String {
+    format!("{}_ref.csv", profile.name)
 }
 
 /// File of the inputs.
-pub(crate) fn inputs_name<M: Model>() -> String {
-    format!("{}_in.csv", M::NAME)
+pub(crate) fn inputs_name(profile: &Profile<'_>) -> String {
+    format!("{}_in.csv", profile.name)
 }
 
 /// How the results were computed.
-pub(crate) fn description<M: Model>() -> String {
-    let inputs = match M::DOCUMENTATION.reference_inputs {
-        Some(_) => format!("inputs from {}", inputs_name::<M>()),
+pub(crate) fn description(profile: &Profile<'_>) -> String {
+    let inputs = match profile.documentation.reference_inputs {
+        Some(_) => format!("inputs from {}", inputs_name(profile)),
         None => "inputs at their start values".into(),
     };
     format!(
-        "Default experiment (0 to {} s, step {} s) with all parameters at their defaults and {inputs}, computed with \
+        "Default experiment ({} to {} s, step {} s) with all parameters at their defaults and {inputs}, computed with \
          solver.method = dop853, solver.rtol = 1e-12, solver.atol = 1e-15, written with 12 digits.",
-        number(M::EXPERIMENT.stop),
-        number(M::EXPERIMENT.step),
+        number(profile.start),
+        number(profile.experiment.stop),
+        number(profile.experiment.step),
     )
 }
 
@@ -42,7 +43,7 @@ pub(crate) fn description<M: Model>() -> String {
 ///
 /// # Errors
 /// None that are known: writing goes to memory.
-pub(crate) fn manifest<M: Model>() -> io::Result<Vec<u8>> {
+pub(crate) fn manifest(profile: &Profile<'_>) -> io::Result<Vec<u8>> {
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
     xml.create_element("fmiReferences")
@@ -67,9 +68,9 @@ pub(crate) fn manifest<M: Model>() -> io::Result<Vec<u8>> {
                     .write_empty()
                     .map(|_| ())
             };
-            related("text/csv", &results_name::<M>(), "result", &description::<M>())?;
-            if M::DOCUMENTATION.reference_inputs.is_some() {
-                related("text/csv", &inputs_name::<M>(), "other", "Inputs of the reference run")?;
+            related("text/csv", &results_name(profile), "result", &description(profile))?;
+            if profile.documentation.reference_inputs.is_some() {
+                related("text/csv", &inputs_name(profile), "other", "Inputs of the reference run")?;
             }
             related("text/html", "../../documentation/index.html", "document", "Documentation of the model")
         })?;
@@ -78,11 +79,11 @@ pub(crate) fn manifest<M: Model>() -> io::Result<Vec<u8>> {
 }
 
 /// `fmi-ls-ref.txt`: what a user of the results should know.
-pub(crate) fn notes<M: Model>() -> String {
+pub(crate) fn notes(profile: &Profile<'_>) -> String {
     format!(
         "Reference results of {}\n\n{}\n\nThe file holds every output. At the default solver settings a run differs from \
          it by the error of that method; how the results themselves were checked is told in index.html.\n",
-        M::NAME,
-        description::<M>(),
+        profile.name,
+        description(profile),
     )
 }

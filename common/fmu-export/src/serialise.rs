@@ -9,6 +9,8 @@
 use std::ops::Range;
 
 use model::Model;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use crate::jobs::Size;
 use crate::state::State;
@@ -73,14 +75,7 @@ impl<M: Model> Instance<M> {
     /// # Errors
     /// None in practice: writing goes to memory.
     pub fn serialise(&self, saved: &State<M>) -> Result<Vec<u8>, Fault> {
-        let mut bytes = vec![0; HEAD[2]];
-        bytes = postcard::to_extend(saved, bytes).map_err(|_| Content)?;
-        let length = (bytes.len() + CHECKSUM) as u64;
-        bytes[..HEAD[0]].copy_from_slice(&VERSION.to_le_bytes());
-        bytes[HEAD[0]..HEAD[1]].copy_from_slice(&length.to_le_bytes());
-        bytes[HEAD[1]..HEAD[2]].copy_from_slice(&self.table.hash.to_le_bytes());
-        bytes.extend(checksum(&bytes).to_le_bytes());
-        Ok(bytes)
+        Ok(self.table.framed(saved)?)
     }
 
     /// A saved state from bytes.
@@ -88,12 +83,38 @@ impl<M: Model> Instance<M> {
     /// # Errors
     /// [`SerialisedStateError`].
     pub fn deserialise(&self, bytes: &[u8]) -> Result<Box<State<M>>, Fault> {
-        let content = checked(bytes, self.table.hash)?;
-        let (state, rest) = postcard::take_from_bytes::<State<M>>(content).map_err(|_| Content)?;
-        if !rest.is_empty() || !state.fits(&self.table) {
+        let state: State<M> = self.table.unframed(bytes)?;
+        if !state.fits(&self.table) {
             return Err(Content.into());
         }
         Ok(Box::new(state))
+    }
+}
+
+impl Table {
+    /// A state of the FMU with this table as bytes.
+    ///
+    /// # Errors
+    /// None in practice: writing goes to memory.
+    pub fn framed<T: Serialize>(&self, state: &T) -> Result<Vec<u8>, SerialisedStateError> {
+        let mut bytes = vec![0; HEAD[2]];
+        bytes = postcard::to_extend(state, bytes).map_err(|_| Content)?;
+        let length = (bytes.len() + CHECKSUM) as u64;
+        bytes[..HEAD[0]].copy_from_slice(&VERSION.to_le_bytes());
+        bytes[HEAD[0]..HEAD[1]].copy_from_slice(&length.to_le_bytes());
+        bytes[HEAD[1]..HEAD[2]].copy_from_slice(&self.hash.to_le_bytes());
+        bytes.extend(checksum(&bytes).to_le_bytes());
+        Ok(bytes)
+    }
+
+    /// A state of the FMU with this table from bytes.
+    ///
+    /// # Errors
+    /// [`SerialisedStateError`].
+    pub fn unframed<T: DeserializeOwned>(&self, bytes: &[u8]) -> Result<T, SerialisedStateError> {
+        let content = checked(bytes, self.hash)?;
+        let (state, rest) = postcard::take_from_bytes(content).map_err(|_| Content)?;
+        if rest.is_empty() { Ok(state) } else { Err(Content) }
     }
 }
 

@@ -1,9 +1,10 @@
 //! The variables of the built-in solver, the same in every FMU.
 
 use integrators::{Method, Settings, Statistics};
-use model::{Enumeration, Variables};
+use model::{EnumType, Enumeration, Kind, Model, Variables};
 
 use crate::Fault;
+use crate::table::Variable;
 
 /// Integration method
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Enumeration)]
@@ -22,6 +23,30 @@ pub enum SolverMethod {
     Radau5 = 6,
     /// Transition matrix, for linear parts
     Exact = 7,
+    /// dop853, and radau5 where the equations are stiff
+    Auto = 8,
+}
+
+impl From<Method> for SolverMethod {
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Heun => Self::Heun,
+            Method::Rk4 => Self::Rk4,
+            Method::Dopri5 => Self::Dopri5,
+            Method::Dop853 => Self::Dop853,
+            Method::Rodas4 => Self::Rodas4,
+            Method::Radau5 => Self::Radau5,
+            Method::Exact => Self::Exact,
+        }
+    }
+}
+
+/// Name of a method by its number.
+pub(crate) fn method_name(number: i64) -> &'static str {
+    let Kind::Enumeration(methods) = <SolverMethod as Variables<f64>>::TABLE[0].kind else {
+        return "";
+    };
+    methods.items.iter().find(|i| i.value == number).map_or("unknown", |i| i.name)
 }
 
 /// Solver parameters.
@@ -57,7 +82,57 @@ pub struct SolverCounters {
     pub rejected: u64,
 }
 
+/// Counter of FMUs that choose between explicit and implicit methods themselves.
+#[derive(Debug, Clone, Copy, PartialEq, Variables)]
+#[variables(local)]
+pub(crate) struct AutoCounters {
+    /// Jacobians of implicit methods since the start
+    #[var(name = "solver.jacobians")]
+    pub(crate) jacobians: u64,
+}
+
+/// The type of `solver.method` where `auto` is not on offer.
+static WITHOUT_AUTO: EnumType = {
+    let Kind::Enumeration(all) = <SolverMethod as Variables<f64>>::TABLE[0].kind else {
+        panic!("an enumeration")
+    };
+    EnumType { name: all.name, description: all.description, items: all.items.split_at(7).0 }
+};
+
+/// Type, method, step and tolerances by which the model `M` is solved unless others are set.
+pub(crate) fn defaults<M: Model>(solver: &mut [Variable]) {
+    let [rtol, atol] = M::TOLERANCES;
+    #[allow(clippy::cast_precision_loss, reason = "a small number")]
+    let starts =
+        [("solver.method", M::METHOD as f64), ("solver.step", M::STEP), ("solver.rtol", rtol), ("solver.atol", atol)];
+    for Variable { name, entry, .. } in solver {
+        if let Some((_, start)) = starts.iter().find(|(n, _)| n == name) {
+            entry.start = *start;
+        }
+        if matches!(entry.kind, Kind::Enumeration(_)) && !offers_auto::<M>() {
+            entry.kind = Kind::Enumeration(&WITHOUT_AUTO);
+        }
+    }
+}
+
+/// True if the model `M` lets the export layer choose between explicit and implicit methods.
+pub(crate) const fn offers_auto<M: Model>() -> bool {
+    let mut i = 0;
+    while i < M::METHODS.len() {
+        if M::METHODS[i] == SolverMethod::Auto as i64 {
+            return true;
+        }
+        i += 1;
+    }
+    false
+}
+
 impl SolverParameters {
+    /// True if the method changes with the stiffness of the equations.
+    pub(crate) fn auto(&self) -> bool {
+        self.method == SolverMethod::Auto
+    }
+
     /// Settings of the integrator.
     ///
     /// # Errors
@@ -71,7 +146,7 @@ impl SolverParameters {
             SolverMethod::Heun => Method::Heun,
             SolverMethod::Rk4 => Method::Rk4,
             SolverMethod::Dopri5 => Method::Dopri5,
-            SolverMethod::Dop853 => Method::Dop853,
+            SolverMethod::Dop853 | SolverMethod::Auto => Method::Dop853,
             SolverMethod::Rodas4 => Method::Rodas4,
             SolverMethod::Radau5 => Method::Radau5,
             SolverMethod::Exact => Method::Exact,

@@ -3,12 +3,12 @@
 use model::{Model, Variables};
 
 use crate::inputs::{PortParameters, Span};
-use crate::instance::SAME_TIME;
 use crate::jobs::{Course, Step};
 use crate::phase::{Interface, Phase};
+use crate::solver::AutoCounters;
 use crate::state::State;
 use crate::table::Layout;
-use crate::{Fault, InputTreatment, Instance, SolverCounters};
+use crate::{Fault, InputTreatment, Instance, SolverCounters, SolverParameters, times};
 
 /// Relative change of the inner step from which the stability guard looks again.
 const SAME_STEP: f64 = 1e-6;
@@ -70,44 +70,12 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// The end of a step that the host asks for.
-    #[inline]
-    fn end_of_step(&self, t: f64, step: f64) -> Result<f64, Fault> {
-        let now = self.state.values[0];
-        let same_time = (t - now).abs() <= SAME_TIME * now.abs().max(1.0);
-        if !same_time {
-            return Err(Fault::Argument {
-                argument: "currentCommunicationPoint",
-                value: t,
-                allowed: format!("{now} s, where the instance stands"),
-            });
-        }
-        let to = t + step;
-        if !(step > 0.0 && to.is_finite() && to > now) {
-            return Err(Fault::Argument {
-                argument: "communicationStepSize",
-                value: step,
-                allowed: "> 0 s, finite".into(),
-            });
-        }
-        if let Some(stop) = self.state.stop_time
-            && to > stop + SAME_TIME * stop.abs().max(1.0)
-        {
-            return Err(Fault::Argument {
-                argument: "communicationStepSize",
-                value: step,
-                allowed: format!("<= {} s, up to the stop time {stop} s", stop - t),
-            });
-        }
-        Ok(to)
-    }
-
     /// Advance by one communication step; true if an event at its end is left to Event Mode.
     ///
     /// # Errors
     /// Arguments that make no sense; a step that cannot be done (then nothing has changed).
     pub fn do_step(&mut self, t: f64, step: f64) -> Result<bool, Fault> {
-        let to = self.end_of_step(t, step)?;
+        let to = times::end_of_step(self.state.values[0], self.state.stop_time, t, step)?;
         self.tuned()?;
         let forget = self.reset_signal().to_bits() != self.state.reset_seen.to_bits();
         let State {
@@ -146,6 +114,7 @@ impl<M: Model> Instance<M> {
             u: given,
             course,
             leave_events,
+            auto: SolverParameters::load(&values[Layout::<M>::SOLVER]).auto(),
             guard: fixed && (h - *guarded).abs() > SAME_STEP * h,
             duals: &mut self.duals[Layout::<M>::INPUTS],
             x,
@@ -157,6 +126,9 @@ impl<M: Model> Instance<M> {
         *guarded = h;
         self.warnings.extend(M::notice(&before, discrete));
         SolverCounters::from(*statistics).store(&mut values[Layout::<M>::COUNTERS]);
+        if let [jacobians] = &mut values[Layout::<M>::AUTO_COUNTERS] {
+            AutoCounters { jacobians: statistics.jacobians }.store(std::slice::from_mut(jacobians));
+        }
         self.finish_inputs(span, settled, forget);
         self.state.values[0] = to;
         self.state.fresh = 0;

@@ -9,7 +9,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use model::{Causality, Entry, Group, Kind, Model, Variability, Variables, count_states};
 
 use crate::inputs::{PortParameters, PortReset};
-use crate::{SolverCounters, SolverParameters, Standard};
+use crate::solver::{AutoCounters, defaults, offers_auto};
+use crate::{Fault, SolverCounters, SolverParameters, Standard};
 
 /// Where each group of variables of the model `M` lies in the list, fixed at compile time.
 #[derive(Debug)]
@@ -40,15 +41,19 @@ impl<M: Model> Layout<M> {
         <M::Dynamics<f64> as Variables<f64>>::TABLE,
         <M::Energy<f64> as Variables<f64>>::TABLE,
     ];
-    /// Ends of these sections, then of rates, indicators and counters.
-    const ENDS: [usize; 13] = {
-        let mut ends = [0; 13];
+    /// Counters beside those of every solver.
+    const FURTHER_COUNTERS: &'static [Entry] =
+        if offers_auto::<M>() { <AutoCounters as Variables<f64>>::TABLE } else { &[] };
+    /// Ends of these sections, then of rates, indicators, counters and further counters.
+    const ENDS: [usize; 14] = {
+        let mut ends = [0; 14];
         let (mut at, mut i) = (0, 0);
-        while i < 13 {
+        while i < 14 {
             at += match i {
                 10 => Self::STATES,
                 11 => M::INDICATORS.len(),
                 12 => <SolverCounters as Variables<f64>>::TABLE.len(),
+                13 => Self::FURTHER_COUNTERS.len(),
                 i => Self::SECTIONS[i].len(),
             };
             ends[i] = at;
@@ -64,6 +69,7 @@ impl<M: Model> Layout<M> {
     pub(crate) const MOTION: Range<usize> = Self::section(6);
     pub(crate) const RATES: Range<usize> = Self::section(10);
     pub(crate) const COUNTERS: Range<usize> = Self::section(12);
+    pub(crate) const AUTO_COUNTERS: Range<usize> = Self::section(13);
 
     const fn section(i: usize) -> Range<usize> {
         Self::ENDS[i - 1]..Self::ENDS[i]
@@ -114,7 +120,7 @@ impl Part {
 pub(crate) const ALL_PARTS: u8 = 0x3f;
 
 /// The independent variable.
-pub(crate) const TIME: Entry = {
+pub const TIME: Entry = {
     let mut time = Entry::scalar("time", Kind::Float64);
     time.description = "Simulation time";
     time.unit = "s";
@@ -170,13 +176,7 @@ impl Table {
         let plain = |name: String, entry: Entry| Variable { name, entry, derivative_of: None };
         let mut variables: Vec<_> =
             Layout::<M>::SECTIONS.into_iter().flatten().map(|entry| plain(entry.name(), *entry)).collect();
-        #[allow(clippy::cast_precision_loss, reason = "a small number")]
-        {
-            let starts = [M::METHOD as f64, M::STEP, M::RTOL, M::ATOL];
-            for (variable, start) in variables[Layout::<M>::SOLVER].iter_mut().zip(starts) {
-                variable.entry.start = start;
-            }
-        }
+        defaults::<M>(&mut variables[Layout::<M>::SOLVER]);
         let mut states = Vec::new();
         if M::MODEL_EXCHANGE {
             states.extend((0..variables.len()).filter(|i| variables[*i].entry.rate.is_some()));
@@ -185,7 +185,7 @@ impl Table {
             variables.push(derivative(*state, &variables[*state]));
         }
         variables.extend(M::INDICATORS.iter().map(|name| plain((*name).into(), INDICATOR)));
-        let counters = <SolverCounters as Variables<f64>>::TABLE.iter();
+        let counters = <SolverCounters as Variables<f64>>::TABLE.iter().chain(Layout::<M>::FURTHER_COUNTERS);
         variables.extend(counters.map(|entry| plain(entry.name(), *entry)));
 
         let access =
@@ -210,6 +210,48 @@ impl Table {
         table
     }
 
+    /// A table of variables without states; `name` and variables make its token.
+    #[must_use]
+    pub fn of(name: &str, variables: Vec<Variable>) -> Self {
+        let float = |v: &Variable| if v.entry.kind == Kind::Float64 { FLOAT } else { 0 };
+        Self {
+            states: Vec::new(),
+            access: variables.iter().map(float).collect(),
+            affects: vec![0; variables.len()],
+            hash: hash(name, &variables),
+            variables,
+        }
+    }
+
+    /// A variable by its value reference.
+    ///
+    /// # Errors
+    /// [`Fault::UnknownReference`].
+    pub fn variable(&self, reference: u32) -> Result<&Variable, Fault> {
+        self.variables
+            .get(reference as usize)
+            .ok_or(Fault::UnknownReference { reference, count: self.variables.len() })
+    }
+
+    /// A variable of one of the types for which `is` is true; `called` is the type of the call in the `standard`.
+    ///
+    /// # Errors
+    /// [`Fault::UnknownReference`], [`Fault::WrongType`].
+    pub fn typed(
+        &self,
+        reference: u32,
+        standard: Standard,
+        called: &'static str,
+        is: impl Fn(Kind) -> bool,
+    ) -> Result<&Variable, Fault> {
+        let variable = self.variable(reference)?;
+        let (name, kind) = (&variable.name, variable.entry.kind);
+        if is(kind) {
+            return Ok(variable);
+        }
+        Err(Fault::WrongType { variable: name.clone(), reference, is: standard.type_name(kind), called })
+    }
+
     /// The variables in the order of their value references.
     #[must_use]
     pub fn variables(&self) -> &[Variable] {
@@ -223,7 +265,8 @@ impl Table {
     }
 
     /// Start values of all variables.
-    pub(crate) fn start_values(&self) -> Vec<f64> {
+    #[must_use]
+    pub fn start_values(&self) -> Vec<f64> {
         self.variables.iter().map(|v| v.entry.start).collect()
     }
 
@@ -233,7 +276,8 @@ impl Table {
     }
 
     /// Value references of the inputs and states that a variable depends on directly, ascending.
-    pub(crate) fn dependencies(&self, unknown: usize) -> Vec<usize> {
+    #[must_use]
+    pub fn dependencies(&self, unknown: usize) -> Vec<usize> {
         let depends = self.variables[unknown].entry.depends;
         let component = self.variables[unknown].name.rsplit('.').next().unwrap_or_default();
         let covers = |name: &str| {
@@ -260,8 +304,9 @@ impl Table {
             .collect()
     }
 
-    /// [Hash](Self::hash) of the variable table in the form of a GUID.
-    pub(crate) fn token(&self) -> String {
+    /// Hash of the variables in the form of a GUID: changes when the interface changes.
+    #[must_use]
+    pub fn token(&self) -> String {
         guid(self.hash)
     }
 }
@@ -326,10 +371,14 @@ impl Fnv {
 }
 
 /// The allowed values of a variable, for a message.
-pub(crate) fn allowed(entry: &Entry) -> String {
+#[must_use]
+pub fn allowed(entry: &Entry) -> String {
     if let Kind::Enumeration(t) = entry.kind {
         let items: Vec<_> = t.items.iter().map(|i| format!("{} ({})", i.name, i.value)).collect();
         return items.join(", ");
+    }
+    if entry.switch {
+        return "0 or 1".into();
     }
     let above = entry.min > 0.0 && entry.min <= f64::MIN_POSITIVE;
     let range = match (entry.min.is_finite(), entry.max.is_finite()) {

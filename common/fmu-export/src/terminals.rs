@@ -17,11 +17,11 @@
 use std::collections::BTreeSet;
 use std::io;
 
-use model::{Causality, Model, PortLaw};
+use model::{Causality, PortLaw};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
 
-use crate::table::{Table, Variable};
+use crate::table::Variable;
 
 /// Kind of a port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,8 +73,11 @@ fn mark(variables: &[Variable], name: &str) -> &'static str {
 /// Quantities of a port; `s` is the position of a scalar one.
 const QUANTITIES: [&str; 7] = ["r", "s", "v", "a", "F", "F0", "M"];
 
-/// Port, quantity and component of `P.F0.x`; none for other variables.
-pub(crate) fn parts(name: &str) -> Option<(&str, &str, &str)> {
+/// Port, quantity and component of `P.F0.x`, and of `upper.P.F0.x` in an assembly; none for other variables.
+///
+/// The name of a port begins with a capital letter.
+#[must_use]
+pub fn parts(name: &str) -> Option<(&str, &str, &str)> {
     let mut found = None;
     for quantity in QUANTITIES {
         for (at, dotted) in name.match_indices('.') {
@@ -86,7 +89,10 @@ pub(crate) fn parts(name: &str) -> Option<(&str, &str, &str)> {
             }
         }
     }
-    found.filter(|(port, ..)| port.starts_with(|c: char| c.is_ascii_uppercase()))
+    found.filter(|(port, ..)| {
+        let own = port.find(".slot[").map_or(*port, |at| &port[..at]);
+        own.rsplit('.').next().is_some_and(|name| name.starts_with(|c: char| c.is_ascii_uppercase()))
+    })
 }
 
 /// What the port `name` is, if it is one.
@@ -153,9 +159,7 @@ fn representation(xml: &mut Xml) -> io::Result<()> {
 ///
 /// # Errors
 /// None that are known: writing goes to memory.
-pub(crate) fn terminals<M: Model>() -> io::Result<Vec<u8>> {
-    let table = Table::new::<M>();
-    let variables = table.variables();
+pub(crate) fn terminals(variables: &[Variable]) -> io::Result<Vec<u8>> {
     let (names, ports) = (names(variables), ports(variables));
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
@@ -217,6 +221,7 @@ mod tests {
         assert_eq!(parts("P.F0.x"), Some(("P", "F0", ".x")));
         assert_eq!(parts("P.slot[2].M.xx"), Some(("P.slot[2]", "M", ".xx")));
         assert_eq!(parts("H.s"), Some(("H", "s", "")));
+        assert_eq!(parts("lower.P.slot[2].F.x"), Some(("lower.P.slot[2]", "F", ".x")));
         for other in ["chassis.a.x", "loop.gap", "P", "strut.force", "angle.theta", "der(P.r.x)"] {
             assert_eq!(parts(other), None, "{other}");
         }

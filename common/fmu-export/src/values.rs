@@ -18,7 +18,7 @@ impl<M: Model> Instance<M> {
         for reference in references {
             match self.table.access.get(*reference as usize) {
                 Some(access) if access & FLOAT != 0 => needed |= access,
-                _ => return Err(self.wrong_type(*reference, self.type_name(Kind::Float64))),
+                _ => return Err(self.not_float(*reference)),
             }
         }
         if self.state.phase == Phase::Instantiated {
@@ -32,28 +32,17 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// Before initialisation there are start values only.
-    fn have_start(&self, references: &[u32]) -> Result<(), Fault> {
-        let computed = |v: &Variable| v.entry.causality != Causality::Inherit && !v.entry.has_start();
-        for reference in references {
-            let variable = self.variable(*reference)?;
-            if computed(variable) {
-                return Err(Fault::NoValue { variable: variable.name.clone() });
-            }
-        }
-        Ok(())
+    /// Why a reference is not read as Float64.
+    #[cold]
+    fn not_float(&self, reference: u32) -> Fault {
+        let standard = self.state.interface.standard();
+        let found = self.table.typed(reference, standard, standard.type_name(Kind::Float64), |_| false);
+        found.err().unwrap_or(Fault::UnknownReference { reference, count: self.table.variables.len() })
     }
 
-    fn wrong_type(&self, reference: u32, called: &'static str) -> Fault {
-        match self.variable(reference) {
-            Ok(v) => Fault::WrongType {
-                variable: v.name.clone(),
-                reference,
-                is: self.type_name(v.entry.kind),
-                called,
-            },
-            Err(fault) => fault,
-        }
+    /// Before initialisation there are start values only.
+    fn have_start(&self, references: &[u32]) -> Result<(), Fault> {
+        references.iter().try_for_each(|reference| has_value(self.variable(*reference)?))
     }
 
     /// Read variables of another type; all of them are stored as whole numbers. `put` says whether the
@@ -69,9 +58,7 @@ impl<M: Model> Instance<M> {
         mut put: impl FnMut(usize, f64) -> bool,
     ) -> Result<(), Fault> {
         for reference in references {
-            if !is(self.variable(*reference)?.entry.kind) {
-                return Err(self.wrong_type(*reference, called));
-            }
+            self.table.typed(*reference, self.state.interface.standard(), called, &is)?;
         }
         for (i, reference) in references.iter().enumerate() {
             let value = self.state.values[*reference as usize];
@@ -95,24 +82,13 @@ impl<M: Model> Instance<M> {
         value: impl Fn(usize) -> f64,
     ) -> Result<(), Fault> {
         for (i, reference) in references.iter().enumerate() {
-            let Variable { name, entry, .. } = self.variable(*reference)?;
-            if !is(entry.kind) {
-                return Err(self.wrong_type(*reference, called));
+            let State { interface, phase, values, .. } = &self.state;
+            let variable = self.table.typed(*reference, interface.standard(), called, &is)?;
+            if !self.is_state_of_host(*reference) {
+                settable(*interface, *phase, variable)?;
             }
-            let by_host = self.is_state_of_host(*reference);
-            if !by_host && let Some(reason) = self.not_settable(entry) {
-                let phase = format!("{:?}", self.state.phase);
-                return Err(Fault::NotSettable { variable: name.clone(), phase, reason });
-            }
-            if !in_range(entry, value(i)) {
-                let kept = self.state.values[*reference as usize];
-                return Err(Fault::Value {
-                    variable: name.clone(),
-                    value: value(i),
-                    kept,
-                    allowed: allowed(entry),
-                });
-            }
+            let kept = || values[*reference as usize];
+            acceptable(variable, value(i), kept)?;
         }
         for (i, reference) in references.iter().enumerate() {
             self.accept(*reference as usize, value(i));
@@ -168,34 +144,76 @@ impl<M: Model> Instance<M> {
             }
         }
     }
+}
 
-    fn not_settable(&self, entry: &Entry) -> Option<&'static str> {
-        let State { interface, phase, .. } = self.state;
-        let continuous_input =
-            entry.causality == Causality::Input && entry.variability == Variability::Continuous;
-        match phase {
-            Phase::Instantiated | Phase::InitializationMode if !entry.has_start() => {
-                Some("it is computed and has no start value")
-            }
-            Phase::InitializationMode if entry.initial == Initial::Approx => {
-                Some("its start value is a guess (initial = approx); set it before Initialization Mode")
-            }
-            Phase::StepMode | Phase::EventMode | Phase::ContinuousTimeMode if !changes_in_a_run(entry) => {
-                Some("only inputs and tunable parameters change in a run")
-            }
-            Phase::ContinuousTimeMode if !continuous_input => {
-                Some("only continuous inputs and states change between events; set it in Event Mode")
-            }
-            Phase::StepMode if interface == Interface::CoSimulationWithEvents && !continuous_input => {
-                Some("only continuous inputs change between steps where Event Mode is used; set it there")
-            }
-            _ => None,
+/// Check that a variable has a value before initialisation.
+///
+/// # Errors
+/// [`Fault::NoValue`].
+pub fn has_value(variable: &Variable) -> Result<(), Fault> {
+    let Variable { name, entry, .. } = variable;
+    if entry.causality == Causality::Inherit || entry.has_start() {
+        return Ok(());
+    }
+    Err(Fault::NoValue { variable: name.clone() })
+}
+
+/// Check that a variable may be set in a phase.
+///
+/// # Errors
+/// [`Fault::NotSettable`].
+#[inline]
+pub fn settable(interface: Interface, phase: Phase, variable: &Variable) -> Result<(), Fault> {
+    match not_settable(interface, phase, &variable.entry) {
+        None => Ok(()),
+        Some(reason) => {
+            let phase = format!("{phase:?}");
+            Err(Fault::NotSettable { variable: variable.name.clone(), phase, reason })
         }
     }
 }
 
+/// Check that a variable may have a value; otherwise `kept` gives the one it keeps.
+///
+/// # Errors
+/// [`Fault::Value`].
+#[inline]
+pub fn acceptable(variable: &Variable, value: f64, kept: impl FnOnce() -> f64) -> Result<(), Fault> {
+    let Variable { name, entry, .. } = variable;
+    if in_range(entry, value) {
+        return Ok(());
+    }
+    Err(Fault::Value { variable: name.clone(), value, kept: kept(), allowed: allowed(entry) })
+}
+
+fn not_settable(interface: Interface, phase: Phase, entry: &Entry) -> Option<&'static str> {
+    let continuous_input =
+        entry.causality == Causality::Input && entry.variability == Variability::Continuous;
+    match phase {
+        Phase::Instantiated | Phase::InitializationMode if !entry.has_start() => {
+            Some("it is computed and has no start value")
+        }
+        Phase::InitializationMode if entry.initial == Initial::Approx => {
+            Some("its start value is a guess (initial = approx); set it before Initialization Mode")
+        }
+        Phase::StepMode | Phase::EventMode | Phase::ContinuousTimeMode if !changes_in_a_run(entry) => {
+            Some("only inputs and tunable parameters change in a run")
+        }
+        Phase::ContinuousTimeMode if !continuous_input => {
+            Some("only continuous inputs and states change between events; set it in Event Mode")
+        }
+        Phase::StepMode if interface == Interface::CoSimulationWithEvents && !continuous_input => {
+            Some("only continuous inputs change between steps where Event Mode is used; set it there")
+        }
+        _ => None,
+    }
+}
+
 /// Number of references and number of values must agree.
-pub(crate) fn same_length(references: usize, values: usize) -> Result<(), Fault> {
+///
+/// # Errors
+/// [`Fault::Length`].
+pub fn same_length(references: usize, values: usize) -> Result<(), Fault> {
     if references == values { Ok(()) } else { Err(Fault::Length { references, values }) }
 }
 
@@ -205,11 +223,14 @@ pub(crate) fn possible<'a>(entries: impl Iterator<Item = &'a Entry>, values: &[f
 }
 
 /// True if `value` may be set.
-#[allow(clippy::float_cmp, reason = "items are whole numbers")]
+#[allow(clippy::float_cmp, reason = "items and switches are whole numbers")]
 fn in_range(entry: &Entry, value: f64) -> bool {
     if let Kind::Enumeration(t) = entry.kind {
         #[allow(clippy::cast_precision_loss, reason = "items are small")]
         return t.items.iter().any(|i| i.value as f64 == value);
+    }
+    if entry.switch {
+        return value == 0.0 || value == 1.0;
     }
     entry.any || entry.or == Some(value) || value.is_finite() && value >= entry.min && value <= entry.max
 }

@@ -22,8 +22,25 @@ const MAX_PASSES: u32 = 25;
 /// # Errors
 /// What an FMU refuses, an open joint.
 pub fn initialise(sweeper: &mut Sweeper, config: &Config) -> Result<(), RunError> {
-    sweeper.t = config.start;
-    sweeper.each(|_, instance| instance.enter_initialization(config.start, Some(config.stop)))?;
+    enter(sweeper, config.start, Some(config.stop))?;
+    close(sweeper)?;
+    sweeper.each(|_, instance| instance.exit_initialization())
+}
+
+/// Into Initialization Mode.
+///
+/// # Errors
+/// What an FMU refuses.
+pub fn enter(sweeper: &mut Sweeper, start: f64, stop: Option<f64>) -> Result<(), RunError> {
+    sweeper.t = start;
+    sweeper.each(|_, instance| instance.enter_initialization(start, stop))
+}
+
+/// In Initialization Mode: closes the joints and brings all connected values in step.
+///
+/// # Errors
+/// What an FMU refuses, an open joint.
+pub fn close(sweeper: &mut Sweeper) -> Result<(), RunError> {
     if !sweeper.assemble.is_empty() {
         assemble(sweeper)?;
     }
@@ -31,8 +48,7 @@ pub fn initialise(sweeper: &mut Sweeper, config: &Config) -> Result<(), RunError
         sweeper.sweep_open()?;
         check_gap(sweeper)?;
     }
-    sweeper.sweep()?;
-    sweeper.each(|_, instance| instance.exit_initialization())
+    sweeper.sweep()
 }
 
 /// Newton's method on the start parameters; the smallest change that closes the joints.

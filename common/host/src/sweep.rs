@@ -1,7 +1,10 @@
 //! The sweep: one Set and one Get per component and pass, closing joints and affine loops solved in between.
 
+mod driven;
 mod ports;
 
+pub use driven::Driven;
+pub(crate) use driven::SweepState;
 pub use ports::Port;
 
 use nalgebra::{DMatrix, DVector};
@@ -97,6 +100,8 @@ pub struct Sweeper {
     scratch: Vec<f64>,
     /// Start parameters that may change to close the joints: component and value reference
     pub assemble: Vec<(usize, u32)>,
+    /// Inputs from outside the scene
+    pub driven: Driven,
     /// Time of messages [s]
     pub t: f64,
     /// Sweeps so far
@@ -176,6 +181,7 @@ impl Sweeper {
             references: Vec::with_capacity(network.sinks.len()),
             scratch: Vec::with_capacity(network.sinks.len().max(network.signals.len())),
             assemble: Vec::new(),
+            driven: Driven::default(),
             rows,
             instances,
             t: 0.0,
@@ -435,6 +441,13 @@ impl Sweeper {
         let result = base.iter().try_for_each(|call| self.call(call));
         self.base = base;
         result
+    }
+
+    /// Distance at a closing joint [m], over the directions in which it is closed.
+    #[must_use]
+    pub fn distance(&self, joint: &crate::scene::Joint) -> f64 {
+        let square = |axis: &Axis| (self.values[axis.r[0]] - self.values[axis.r[1]]).powi(2);
+        joint.axes.iter().map(square).sum::<f64>().sqrt()
     }
 
     /// Largest distance and relative velocity of the closing joints, and where [m, m/s].

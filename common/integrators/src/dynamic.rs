@@ -12,6 +12,7 @@ use crate::norm::{counted, scaled};
 use crate::pace::{LEAST_ERROR, RESOLUTION, SAFETY, SHRINK, Taken, fit};
 use crate::solver::Memory;
 use crate::{Method, Settings, Statistics, StepError};
+use serde::{Deserialize, Serialize};
 use table::{Errors, Extension, Row, Table};
 
 /// An initial value problem `x' = f(t, x)` of any size.
@@ -49,11 +50,23 @@ pub struct ExplicitSolver {
     /// Counters since the start.
     pub statistics: Statistics,
     step: LastStep,
+    /// Stages of steps repeated with another length
+    again: Vec<Vec<f64>>,
     scratch: Vec<f64>,
     parts: Vec<f64>,
 }
 
+/// What an [`ExplicitSolver`] remembers: with it a run goes on bit by bit as if it had not been interrupted.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ExplicitState {
+    memory: Memory,
+    before: Option<Taken>,
+    statistics: Statistics,
+    step: LastStep,
+}
+
 /// The step taken last.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct LastStep {
     t: f64,
     h: f64,
@@ -62,8 +75,6 @@ struct LastStep {
     end: Vec<f64>,
     /// Stages, and in the last row room for the slope at the end
     k: Vec<Vec<f64>>,
-    /// Stages of steps repeated with another length
-    again: Vec<Vec<f64>>,
     /// The slope at the end is in this stage
     slope: Option<usize>,
     extended: bool,
@@ -107,7 +118,6 @@ impl ExplicitSolver {
             x: vec![0.0; n],
             end: vec![0.0; n],
             k: vec![vec![0.0; n]; table.all_stages() + 1],
-            again: vec![vec![0.0; n]; table.stages()],
             slope: None,
             extended: false,
         };
@@ -120,6 +130,7 @@ impl ExplicitSolver {
             before: None,
             statistics: Statistics::default(),
             step,
+            again: vec![vec![0.0; n]; table.stages()],
             scratch: vec![0.0; n],
             parts: vec![0.0; n],
             table,
@@ -130,6 +141,31 @@ impl ExplicitSolver {
     #[must_use]
     pub fn is_adaptive(&self) -> bool {
         self.adaptive
+    }
+
+    /// What the solver remembers.
+    #[must_use]
+    pub fn save(&self) -> ExplicitState {
+        let Self { memory, before, statistics, step, .. } = self;
+        ExplicitState { memory: *memory, before: *before, statistics: *statistics, step: step.clone() }
+    }
+
+    /// Goes on from what a solver with the same settings has remembered.
+    pub fn restore(&mut self, state: &ExplicitState) {
+        (self.memory, self.before, self.statistics) = (state.memory, state.before, state.statistics);
+        self.step.clone_from(&state.step);
+    }
+
+    /// Whether a state has the sizes of this solver.
+    #[must_use]
+    pub fn fits(&self, state: &ExplicitState) -> bool {
+        let n = self.nominal.len();
+        let LastStep { x, end, k, slope, .. } = &state.step;
+        x.len() == n
+            && end.len() == n
+            && k.len() == self.step.k.len()
+            && k.iter().all(|stage| stage.len() == n)
+            && slope.is_none_or(|stage| stage < k.len())
     }
 
     /// Forgets step size and slope: after a jump of the state or of an input.
@@ -238,11 +274,11 @@ impl ExplicitSolver {
         theta: f64,
         out: &mut [f64],
     ) -> Result<(), StepError<O::Error>> {
-        let Self { table, step, statistics, scratch, .. } = self;
+        let Self { table, step, again, statistics, scratch, .. } = self;
         let h = theta * step.h;
-        step.again[0].copy_from_slice(&step.k[0]);
-        stages(table, ode, (step.t, &step.x, h), &mut step.again, scratch, statistics)?;
-        finish(table, (&step.x, h), &step.again, scratch, out);
+        again[0].copy_from_slice(&step.k[0]);
+        stages(table, ode, (step.t, &step.x, h), again, scratch, statistics)?;
+        finish(table, (&step.x, h), again, scratch, out);
         all_finite(step.t + h, out)
     }
 

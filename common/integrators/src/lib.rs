@@ -84,11 +84,11 @@ mod statistics;
 
 pub use complex::Complex;
 pub use dense::Dense;
-pub use dynamic::{DynamicOde, ExplicitSolver, NotExplicit};
+pub use dynamic::{DynamicOde, ExplicitSolver, ExplicitState, NotExplicit};
 pub use error::{SettingsError, StepError};
 pub use events::{Crossing, Indicators, Reached};
 pub use exact::Transition;
-pub use linear::{Harmonic, LinearOde, LinearSteps};
+pub use linear::{LinearForm, LinearSteps};
 pub use method::Method;
 pub use ode::{Jacobian, Ode};
 pub use run::MAX_EVALUATIONS;

@@ -7,6 +7,8 @@
 //! Source: Hairer, Nørsett & Wanner, sections II.4 and (Hairer & Wanner) IV.2 (PI control), IV.8 (predictive control);
 //! K. Gustafsson, ACM TOMS 17 (1991) and 20 (1994).
 
+use serde::{Deserialize, Serialize};
+
 /// Smallest error remembered, so that one lucky step does not rule the next.
 pub(crate) const LEAST_ERROR: f64 = 1e-4;
 /// The same for predictive control.
@@ -43,7 +45,7 @@ pub(crate) struct Pace {
 }
 
 /// Of a step that counts.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct Taken {
     pub(crate) h: f64,
     pub(crate) error: f64,

@@ -5,8 +5,7 @@
 use std::convert::Infallible;
 
 use integrators::{
-    Harmonic, Jacobian, LinearOde, LinearSteps, MAX_EVALUATIONS, Method, Ode, Settings, Solver, Statistics,
-    StepError,
+    Jacobian, LinearForm, LinearSteps, MAX_EVALUATIONS, Method, Ode, Settings, Solver, Statistics, StepError,
 };
 use proptest::prelude::*;
 
@@ -40,22 +39,29 @@ impl Ode<3> for Mass {
     }
 }
 
-impl LinearOde<3> for Mass {
-    fn states(&self) -> usize {
-        2
+impl Mass {
+    fn form(&self) -> LinearForm<3> {
+        LinearForm {
+            states: 2,
+            amplitude: [0.0, self.F / self.m, 0.0],
+            omega: self.omega,
+            phase: self.phase,
+            steady: self.growth == 0.0 && self.p[1..].iter().all(|p| *p == 0.0),
+        }
     }
-    fn harmonic(&self) -> Harmonic<3> {
-        Harmonic { amplitude: [0.0, self.F / self.m, 0.0], omega: self.omega, phase: self.phase }
-    }
-    fn steady(&self) -> bool {
-        self.growth == 0.0 && self.p[1..].iter().all(|p| *p == 0.0)
-    }
+}
+
+/// Steps of at most `step`.
+fn steps_of(step: f64) -> Settings {
+    Settings { method: Method::Exact, step, rtol: 1e-6, atol: 1e-9 }
 }
 
 /// State after one call over `interval` in steps of at most `step`.
 fn exact(mass: &Mass, interval: f64, step: f64, mut x: [f64; 3]) -> ([f64; 3], Statistics) {
     let mut statistics = Statistics::default();
-    LinearSteps::default().advance(mass, (0.0, interval), step, &mut x, &mut statistics).unwrap();
+    LinearSteps::default()
+        .advance(mass, &mass.form(), (0.0, interval), &steps_of(step), &mut x, &mut statistics)
+        .unwrap();
     (x, statistics)
 }
 
@@ -113,7 +119,14 @@ fn stiffness_of_a_billion_stays_exact_within_rounding() {
 fn a_matrix_that_moves_is_refused() {
     let mass = Mass { growth: 0.1, ..REST };
     let (mut x, mut statistics) = ([1.0, 0.0, 0.0], Statistics::default());
-    let result = LinearSteps::default().advance(&mass, (0.0, 1.0), 0.1, &mut x, &mut statistics);
+    let result = LinearSteps::default().advance(
+        &mass,
+        &mass.form(),
+        (0.0, 1.0),
+        &steps_of(0.1),
+        &mut x,
+        &mut statistics,
+    );
     assert!(matches!(result, Err(StepError::NotLinear { .. })));
     assert_eq!((x, statistics), ([1.0, 0.0, 0.0], Statistics::default()));
 }
@@ -122,7 +135,14 @@ fn a_matrix_that_moves_is_refused() {
 fn too_many_parts_are_refused_before_they_begin() {
     let mass = Mass { c: 1e12, ..REST };
     let (mut x, mut statistics) = ([1.0, 0.0, 0.0], Statistics::default());
-    let result = LinearSteps::default().advance(&mass, (0.0, 1.0), 0.1, &mut x, &mut statistics);
+    let result = LinearSteps::default().advance(
+        &mass,
+        &mass.form(),
+        (0.0, 1.0),
+        &steps_of(0.1),
+        &mut x,
+        &mut statistics,
+    );
     assert!(matches!(result, Err(StepError::TooMuchWork { .. })), "{MAX_EVALUATIONS}");
     assert_eq!(x, [1.0, 0.0, 0.0]);
 }
@@ -133,8 +153,10 @@ fn kept_matrices_change_nothing() {
     let (mut kept, mut fresh) = ([1.0, 0.0, 0.0], [1.0, 0.0, 0.0]);
     let (mut steps, mut counted) = (LinearSteps::default(), Statistics::default());
     for (t, interval) in [(0.0, 0.1), (0.1, 0.1), (0.2, 0.03), (0.23, 0.1)] {
-        steps.advance(&mass, (t, interval), 0.05, &mut kept, &mut counted).unwrap();
-        LinearSteps::default().advance(&mass, (t, interval), 0.05, &mut fresh, &mut counted).unwrap();
+        steps.advance(&mass, &mass.form(), (t, interval), &steps_of(0.05), &mut kept, &mut counted).unwrap();
+        LinearSteps::default()
+            .advance(&mass, &mass.form(), (t, interval), &steps_of(0.05), &mut fresh, &mut counted)
+            .unwrap();
     }
     assert_eq!(kept.map(f64::to_bits), fresh.map(f64::to_bits));
 }
@@ -153,7 +175,9 @@ proptest! {
         let (mut x, mut statistics) = (start, Statistics::default());
         Solver::new(settings).unwrap().advance(&mass, 0.0, 1.0, &mut x, &mut statistics).unwrap();
         for n in 0..3 {
-            prop_assert!((found[n] - x[n]).abs() < 2e-12 * (1.0 + x[n].abs()), "{n}: {} {}", found[n], x[n]);
+            // Gauss on a square that turns by two radians: (6!)^4 / (13 (12!)^3) 2^12 = 8e-13 of a power of some tens of W
+            let tolerance = if n == 2 { 5e-11 } else { 2e-12 };
+            prop_assert!((found[n] - x[n]).abs() < tolerance * (1.0 + x[n].abs()), "{n}: {} {}", found[n], x[n]);
         }
     }
 }

@@ -14,7 +14,9 @@
 //!
 //! Keys of `var`: `name`, `prefix`, `start` (a value, or `[x, y, z]`), `item` (an enumeration's
 //! variant), `min`, `max`, `above` (exclusive lower bound), `or` (a value out of the range that is allowed too), `any`
-//! (values need not be finite), `nominal`, `unit`, `tunable`, `discrete`, `local`, `calculated` (a parameter), `sampled` and `not_affine` (of a port), `exact`, `approx`, `state`, `depends` and, for the time derivative of a state,
+//! (values need not be finite), `nominal`, `unit`, `tunable`, `discrete`, `switch` (0 or 1), `local`, `calculated` (a
+//! parameter), `sampled` and `not_affine` (of a port), `exact`, `approx`, `state`, `depends` and, for the time derivative
+//! of a state,
 //! `rate_depends`: names or prefixes of inputs and states, as one list `["a", "b"]`, the name of a
 //! constant of type `&[&str]`, or a list of such lists, one per component. `P.a.@` stands for the same component
 //! of P.a, `P.a.*` for all components without a scalar P.a, `=P.a` for that scalar alone.
@@ -82,6 +84,7 @@ struct FieldAttributes {
     nominal: Option<Tokens>,
     tunable: bool,
     discrete: bool,
+    switch: bool,
     local: bool,
     calculated: bool,
     port: Option<&'static str>,
@@ -139,6 +142,7 @@ fn field_attributes(field: &Field) -> syn::Result<FieldAttributes> {
             match key.as_str() {
                 "tunable" => a.tunable = true,
                 "discrete" => a.discrete = true,
+                "switch" => a.switch = true,
                 "local" => a.local = true,
                 "calculated" => a.calculated = true,
                 "any" => a.any = true,
@@ -239,7 +243,8 @@ fn field_tokens(
     let (description, unit) = documentation(&field.attrs);
     let unit = a.unit.or(unit).unwrap_or_default();
     let unit = if unit == "1" || unit == "-" { String::new() } else { unit };
-    let (prefix, start, tunable, discrete) = (&a.prefix, &a.start, a.tunable, a.discrete);
+    let (prefix, start) = (&a.prefix, &a.start);
+    let (tunable, discrete, switch) = (a.tunable, a.discrete, a.switch);
     let (depends, rate_depends) = (&a.depends, &a.rate_depends);
     let rate_unit = a.state.then(|| per_second(&unit)).map(|u| quote!(#u));
     let rate_unit = option(rate_unit.as_ref());
@@ -259,6 +264,7 @@ fn field_tokens(
                 causality: ::model::Causality::#field_causality,
                 tunable: #tunable,
                 discrete: #discrete,
+                switch: #switch,
                 port: ::model::PortLaw::#port,
                 initial: ::model::Initial::#initial,
                 start: &[#(#start),*],

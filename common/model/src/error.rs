@@ -27,6 +27,16 @@ pub enum EvaluationError {
         /// What would be accepted
         allowed: &'static str,
     },
+    /// A state has grown beyond what the equations can square.
+    #[error("{variable} = {value:.3e} is too large; allowed: |{variable}| <= {limit:.0e}")]
+    TooLarge {
+        /// Name of the state
+        variable: &'static str,
+        /// Its value
+        value: f64,
+        /// Its largest usable magnitude
+        limit: f64,
+    },
     /// The inertia of an element admits no unique motion.
     #[error("{element}: {source}")]
     Inertia {

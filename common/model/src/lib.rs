@@ -29,7 +29,7 @@ pub use jacobian::{Dense, Spectrum, directional, state_jacobian};
 pub use leaf::{NoVariables, SymmetricTensor, Vector3};
 pub use mechanics::{Matrix, Scalar};
 pub use model_derive::{Enumeration, Variables};
-pub use system::{Experiment, Group, Linear, Model, Outputs, System, Visitor};
+pub use system::{Experiment, Group, Linear, Model, Outputs, Pace, System, Visitor};
 pub use variable::{
     Attributes, Causality, Entry, EnumType, Initial, Item, Kind, PortLaw, Rate, Variability, Variables,
     count_states, fill,

@@ -15,6 +15,15 @@ pub struct Experiment {
     pub step: f64,
 }
 
+/// What `solver.method = auto` has to know at a moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    /// An implicit method is cheaper
+    pub stiff: bool,
+    /// Time after which to ask again [s]
+    pub span: f64,
+}
+
 /// The first states follow `y' = A y + b + c sin(omega t + phase)`, with `A` constant as long as inertias at the ports are
 /// and `b` linear in the inputs; the other states are integrals of these.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,10 +77,8 @@ pub trait Model: Clone + Sized + 'static {
     const METHOD: i64 = 2;
     /// Start value of `solver.step` [s]
     const STEP: f64 = 1e-3;
-    /// Start value of `solver.rtol`
-    const RTOL: f64 = 1e-6;
-    /// Start value of `solver.atol`
-    const ATOL: f64 = 1e-9;
+    /// Start values of `solver.rtol` and `solver.atol`
+    const TOLERANCES: [f64; 2] = [1e-6, 1e-9];
     /// Names of the event indicators; a system with fewer uses the first ones
     const INDICATORS: &'static [&'static str] = &[];
     /// Constants of a run
@@ -241,6 +248,17 @@ pub trait System<const N: usize, const Z: usize> {
     /// See [`System::rates`].
     fn project(&self, _t: f64, _x: &mut [f64; N]) -> Result<bool, EvaluationError> {
         Ok(false)
+    }
+
+    /// Which kind of method `solver.method = auto` takes now.
+    fn pace(
+        &self,
+        _t: f64,
+        _x: &[f64; N],
+        _u: &<Self::Model as Model>::Inputs<f64>,
+        _d: &<Self::Model as Model>::Discrete,
+    ) -> Pace {
+        Pace { stiff: false, span: f64::INFINITY }
     }
 
     /// How the equations are linear now, for `solver.method = exact`; otherwise another method takes the step.

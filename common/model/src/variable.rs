@@ -117,6 +117,8 @@ pub struct Entry {
     pub any: bool,
     /// Typical magnitude
     pub nominal: f64,
+    /// Takes 0 and 1 only
+    pub switch: bool,
     /// Inputs and states that the value depends on directly: names, groups by prefix (`P.F`), or the
     /// same component of a group (`A.r.@`); a state depends on itself without being named
     pub depends: &'static [&'static str],
@@ -150,6 +152,8 @@ pub struct Attributes {
     pub tunable: bool,
     /// Changes at events only
     pub discrete: bool,
+    /// Takes 0 and 1 only
+    pub switch: bool,
     /// What the port does whose variables these are
     pub port: PortLaw,
     /// What the start value means
@@ -208,6 +212,7 @@ impl Entry {
             or: None,
             any: false,
             nominal: 1.0,
+            switch: false,
             depends: &[],
             rate: None,
             port: PortLaw::Regular,
@@ -263,6 +268,9 @@ impl Entry {
             self.start = a.start[0];
         } else if a.start.len() > 1 {
             self.start = a.start[component];
+        }
+        if a.switch {
+            (self.switch, self.min, self.max) = (true, 0.0, 1.0);
         }
         if let Some(min) = a.min {
             self.min = min;

@@ -8,6 +8,11 @@
 use mechanics::{Dim, Load, Scalar, Space, Vector};
 use model::{SymmetricTensor, Variables, Vector3};
 
+/// Part of a vector along a fixed direction, a unit vector.
+pub(crate) fn along<S: Scalar>(direction: &Vector3<f64>, v: &Vector3<S>) -> S {
+    v.x * direction.x + v.y * direction.y + v.z * direction.z
+}
+
 /// A slot of a leader port: the load `F - M a` acts on the leader.
 #[derive(Debug, Clone, Copy, PartialEq, Variables)]
 pub struct Slot<S> {

@@ -56,6 +56,8 @@ impl<M: Model> Sparsity<M> {
                 let diagonal = [".xx", ".yy", ".zz"].iter().any(|d| name.ends_with(d));
                 let value = if diagonal { random.between(2.0, 4.0) } else { random.between(-1.0, 1.0) };
                 let value = if name == "port.reset" { 0.0 } else { value };
+                let value = if entry.switch { 1.0 } else { value };
+                let value = if entry.min >= 0.0 && !diagonal { value.abs().max(entry.min) } else { value };
                 fmu.set(name, value).expect("an input or a start value");
             }
         }

@@ -2,7 +2,7 @@
 
 use export_tests::{Random, sparsity::Sparsity};
 use model::Model;
-use models::absorber::PrimaryOscillator;
+use models::absorber::{PrimaryOscillator, RvdpAbsorber};
 use models::parts::{Bushing, Guide, Load};
 use models::suspension::{DoublePendulum, FourBar, Link2, Link3, StrutLink};
 
@@ -80,5 +80,20 @@ fn primary_oscillator_dependencies_are_exact() {
         &[&kind(2.0, 2.0, 1.0)[..], &gravity].concat(),
         &[&kind(2.0, 2.0, 2.0)[..], &gravity].concat(),
         &[("dof", 2.0), ("ground.stiffness", 10.0)],
+    ]);
+}
+
+#[test]
+fn rvdp_absorber_dependencies_are_exact() {
+    let general =
+        [("axis.x", 0.3), ("axis.y", -0.4), ("gravity.x", 1.0), ("gravity.y", 2.0), ("gravity.z", 3.0)];
+    let kind = |kind: f64, law: f64| {
+        [("port.kind", kind), ("control.law", law), ("control.force", 3.0), ("w.start", 0.2)]
+    };
+    declared_are_observed::<RvdpAbsorber>(&[
+        &[&kind(1.0, 2.0)[..], &general].concat(),
+        &[&kind(1.0, 3.0)[..], &general].concat(),
+        &[&kind(2.0, 2.0)[..], &general].concat(),
+        &[&kind(2.0, 3.0)[..], &general, &[("use.stroke_stop", 1.0), ("stroke.limit", 1e-3)]].concat(),
     ]);
 }

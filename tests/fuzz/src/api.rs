@@ -5,13 +5,14 @@ mod fmi2;
 mod fmi3;
 
 use std::ffi::{CStr, CString, c_char};
-use std::path::Path;
+use std::path::PathBuf;
 use std::ptr;
 
 use fmi_capi::fmi2::Callbacks;
 use fmi_capi::fmi3::{self as functions, Flag, Instance};
 use fmi_capi::{Library, LoadError, Log, Status};
 
+use crate::archive::Opened;
 use crate::standard::{Interface, Version};
 
 /// Values handed over as a C array: their number, and a pointer to them or null.
@@ -175,6 +176,8 @@ pub(crate) struct Updated {
 pub(crate) struct Api {
     f: Functions,
     special: Special,
+    /// Path or URI of the folder of this name
+    resources: Option<CString>,
     // last: closed after everything else
     _library: Library,
 }
@@ -193,24 +196,30 @@ fn unless<T>(pointer: *mut T, null: Option<usize>, index: usize) -> *mut T {
 }
 
 impl Api {
-    pub(crate) fn load(path: &Path, version: Version) -> Result<Self, LoadError> {
-        let library = Library::open(path)?;
+    pub(crate) fn load(fmu: &Opened) -> Result<Self, LoadError> {
+        let version = fmu.description.version;
+        let library = Library::open(&fmu.library)?;
+        let scheme = if version == Version::Fmi2 { "file://" } else { "" };
+        let text = |folder: &PathBuf| format!("{scheme}{}/", folder.display());
+        let resources = CString::new(fmu.resources.as_ref().map(text).unwrap_or_default());
         let special = match version {
             Version::Fmi2 => Special::Fmi2(fmi2::Functions::find(&library)?),
             Version::Fmi3 => Special::Fmi3(fmi3::Functions::find(&library)?),
         };
-        Ok(Self { f: Functions::find(&library, version)?, special, _library: library })
+        let resources = resources.ok().filter(|text| !text.is_empty());
+        Ok(Self { f: Functions::find(&library, version)?, special, resources, _library: library })
     }
 
     /// A new instance, or what was said instead.
     pub(crate) fn instantiate(&self, interface: Interface, token: &CStr) -> Result<Handle, Box<Log>> {
         let log = Box::<Log>::default();
+        let resources = self.resources.as_ref().map_or(ptr::null(), |text| text.as_ptr());
         let (instance, callbacks) = match &self.special {
             Special::Fmi2(f) => {
-                let (instance, callbacks) = f.instantiate(interface, token, &log);
+                let (instance, callbacks) = f.instantiate(interface, token, resources, &log);
                 (instance, Some(callbacks))
             }
-            Special::Fmi3(f) => (f.instantiate(interface, token, &log), None),
+            Special::Fmi3(f) => (f.instantiate(interface, token, resources, &log), None),
         };
         if instance.is_null() { Err(log) } else { Ok(Handle { instance, log, _callbacks: callbacks }) }
     }

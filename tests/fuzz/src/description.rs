@@ -63,9 +63,19 @@ impl Variable {
         if self.kind == Kind::Enumeration {
             return self.items.iter().any(|(_, item)| *item as f64 == value);
         }
+        if self.is_switch() {
+            return value == 0.0 || value == 1.0;
+        }
         value.is_finite()
             && self.min.is_none_or(|min| value >= min)
             && self.max.is_none_or(|max| value <= max)
+    }
+
+    /// A discrete number from 0 to 1 is a switch: inputs are Float64 for all hosts, Boolean ones too.
+    #[allow(clippy::float_cmp, reason = "as declared")]
+    fn is_switch(&self) -> bool {
+        let discrete = self.causality == Causality::Input && !self.continuous;
+        discrete && self.min == Some(0.0) && self.max == Some(1.0)
     }
 }
 
@@ -77,6 +87,7 @@ pub(crate) struct Description {
     pub(crate) token: String,
     pub(crate) model_exchange: bool,
     pub(crate) serialises: bool,
+    pub(crate) derives: bool,
     pub(crate) stop: f64,
     pub(crate) step: f64,
     pub(crate) variables: Vec<Variable>,
@@ -145,6 +156,9 @@ impl Description {
                     found.identifier = text(&a, "modelIdentifier");
                     let serialises = a.get("canSerializeFMUState").or(a.get("canSerializeFMUstate"));
                     found.serialises = serialises.is_some_and(|v| v == "true");
+                    let derives =
+                        a.get("providesDirectionalDerivatives").or(a.get("providesDirectionalDerivative"));
+                    found.derives = derives.is_some_and(|v| v == "true");
                 }
                 "ModelExchange" => found.model_exchange = true,
                 "EnumerationType" | "SimpleType" => open_type = text(&a, "name"),

@@ -100,7 +100,10 @@ impl Generator<'_> {
     }
 
     fn interface(&mut self) -> Interface {
-        self.random.pick(Interface::of(self.description.version))
+        let exchange = self.description.model_exchange;
+        let offered = |interface: &&Interface| exchange || !interface.is_model_exchange();
+        let of_version = Interface::of(self.description.version).iter().filter(offered);
+        self.random.pick(&of_version.copied().collect::<Vec<_>>())
     }
 
     /// Where the instance is after the call.

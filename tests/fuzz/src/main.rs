@@ -38,6 +38,7 @@ use std::time::{Duration, Instant};
 use std::{fs, process};
 
 use crate::api::Api;
+use crate::archive::Opened;
 use crate::call::Call;
 use crate::check::Counts;
 use crate::machine::{Fmu, Violation};
@@ -95,7 +96,7 @@ fn supervise(options: &Options) -> Result<bool, FuzzError> {
 
 /// Find the calls that end the process, each attempt in a process of its own.
 fn report_crash(options: &Options, seed: u64, progress: &std::path::Path) -> Result<(), FuzzError> {
-    let (description, _) = archive::open(&options.fmu, options.library.as_deref(), &folder())?;
+    let Opened { description, .. } = archive::open(&options.fmu, options.library.as_deref(), &folder())?;
     let calls = generate::sequence(seed, &description);
     let crashes = |kept: &[usize]| {
         let one = Options { seed, sequences: Some(1), keep: Some(kept.to_vec()), ..options.clone() };
@@ -113,12 +114,22 @@ fn folder() -> std::path::PathBuf {
 /// Run the sequences here; true if all went well.
 fn work(options: &Options) -> Result<bool, FuzzError> {
     watchdog::start(Duration::from_secs(options.limit));
-    let (description, library) = archive::open(&options.fmu, options.library.as_deref(), &folder())?;
-    let api = Api::load(&library, description.version);
-    let foreign = options.other.as_deref().map_or(Ok(Vec::new()), foreign_state)?;
-    let _ = fs::remove_dir_all(folder()); // the open library stays
+    let opened = archive::open(&options.fmu, options.library.as_deref(), &folder())?;
+    let result = options
+        .other
+        .as_deref()
+        .map_or(Ok(Vec::new()), foreign_state)
+        .and_then(|foreign| sequences(options, opened, foreign));
+    let _ = fs::remove_dir_all(folder());
+    result
+}
+
+/// Run the sequences on an open FMU.
+fn sequences(options: &Options, opened: Opened, foreign: Vec<u8>) -> Result<bool, FuzzError> {
+    let api = Api::load(&opened)?;
+    let description = opened.description;
     let token = CString::new(description.token.clone())?;
-    let fmu = Fmu { api: api?, description, token, foreign };
+    let fmu = Fmu { api, description, token, foreign };
     let begin = Instant::now();
     let (mut total, mut done) = (Counts::default(), 0);
     while options.sequences.is_none_or(|n| done < n)
@@ -163,8 +174,9 @@ fn work(options: &Options) -> Result<bool, FuzzError> {
 
 /// The serialised state of another FMU, just made.
 fn foreign_state(path: &std::path::Path) -> Result<Vec<u8>, FuzzError> {
-    let (description, library) = archive::open(path, None, &folder().join("other"))?;
-    let api = Api::load(&library, description.version)?;
+    let opened = archive::open(path, None, &folder().join("other"))?;
+    let api = Api::load(&opened)?;
+    let description = opened.description;
     let token = CString::new(description.token.clone())?;
     let interfaces = standard::Interface::of(description.version);
     let instance = interfaces.last().and_then(|interface| api.instantiate(*interface, &token).ok());

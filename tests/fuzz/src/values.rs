@@ -334,8 +334,9 @@ impl Machine<'_> {
         knowns: &[(u32, f64)],
         spoil: Spoil,
     ) -> Answer {
+        let declared = !adjoint && self.fmu.description.derives;
         let rule =
-            self.rule(slot, if adjoint { Function::Undeclared } else { Function::DirectionalDerivative });
+            self.rule(slot, if declared { Function::DirectionalDerivative } else { Function::Undeclared });
         let expected = if rule.allows(OK) { self.deriving(slot, unknowns, knowns, spoil) } else { rule };
         let (mut unknowns, n) = (unknowns.to_vec(), spoilt_length(unknowns.len(), spoil));
         let mut sensitivity = vec![f64::NAN; if adjoint { knowns.len() } else { n }];

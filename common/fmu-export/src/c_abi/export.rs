@@ -1,4 +1,4 @@
-//! The exported symbols of an FMU, made by a macro because each needs its model.
+//! The exported symbols of an FMU, made by a macro because each needs its instance.
 
 /// Export a model: all functions of FMI 2.0 and 3.0 with the model behind them.
 ///
@@ -6,8 +6,16 @@
 #[macro_export]
 macro_rules! export {
     ($model:ty) => {
-        $crate::export_fmi2! { $model }
-        $crate::export_fmi3! { $model }
+        $crate::export_instance! { $crate::Instance<$model> }
+    };
+}
+
+/// Export any [`Exported`](crate::Exported) instance in the same way.
+#[macro_export]
+macro_rules! export_instance {
+    ($instance:ty) => {
+        $crate::export_fmi2! { $instance }
+        $crate::export_fmi3! { $instance }
     };
 }
 
@@ -15,8 +23,8 @@ macro_rules! export {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! export_fmi2 {
-    ($model:ty) => {
-        $crate::functions! { $model, fmi2_functions fmi2,
+    ($instance:ty) => {
+        $crate::functions! { $instance, fmi2_functions fmi2,
             // inquire and log
             fmi2SetDebugLogging(logging_on: i32, n: usize, categories: *const *const c_char);
             // initialise, reset, end
@@ -60,7 +68,7 @@ macro_rules! export_fmi2 {
             fmi2GetBooleanStatus(kind: u32, value: *mut i32);
             fmi2GetStringStatus(kind: u32, value: *mut *const c_char);
         }
-        $crate::unsupported! { $model, fmi2_unsupported fmi2,
+        $crate::unsupported! { $instance, fmi2_unsupported fmi2,
             "inputs go on as port.inputs says":
             fmi2SetRealInputDerivatives(vr: *const u32, n: usize, orders: *const i32, values: *const f64);
             "maxOutputDerivativeOrder = 0":
@@ -89,26 +97,26 @@ macro_rules! export_fmi2 {
                 functions: *const fmi2::CallbackFunctions, visible: i32, logging_on: i32,
             ) -> *mut c_void {
                 // SAFETY: the arguments as the host passes them.
-                unsafe { fmi2::fmi2Instantiate::<$model>(name, interface, guid, functions) }
+                unsafe { fmi2::fmi2Instantiate::<$instance>(name, interface, guid, resources, functions) }
             }
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi2FreeInstance(instance: *mut c_void) {
                 // SAFETY: the instance as the host passes it.
-                unsafe { fmi2::fmi2FreeInstance::<$model>(instance) }
+                unsafe { fmi2::fmi2FreeInstance::<$instance>(instance) }
             }
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi2SetupExperiment(
                 instance: *mut c_void, tolerance_defined: i32, tolerance: f64, start: f64, stop_defined: i32, stop: f64,
             ) -> Status {
                 // SAFETY: the arguments as the host passes them.
-                unsafe { fmi2::fmi2SetupExperiment::<$model>(instance, start, stop_defined, stop) }
+                unsafe { fmi2::fmi2SetupExperiment::<$instance>(instance, start, stop_defined, stop) }
             }
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi2DoStep(
                 instance: *mut c_void, t: f64, step: f64, no_set_state_prior: i32,
             ) -> Status {
                 // SAFETY: the arguments as the host passes them.
-                unsafe { fmi2::fmi2DoStep::<$model>(instance, t, step) }
+                unsafe { fmi2::fmi2DoStep::<$instance>(instance, t, step) }
             }
         }
     };
@@ -118,8 +126,8 @@ macro_rules! export_fmi2 {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! export_fmi3 {
-    ($model:ty) => {
-        $crate::functions! { $model, fmi3_functions fmi3,
+    ($instance:ty) => {
+        $crate::functions! { $instance, fmi3_functions fmi3,
             // inquire and log
             fmi3SetDebugLogging(logging_on: u8, n: usize, categories: *const *const c_char);
             // initialise, reset, end
@@ -162,7 +170,7 @@ macro_rules! export_fmi3 {
             fmi3SerializeFMUState(state: *mut c_void, data: *mut u8, size: usize);
             fmi3DeserializeFMUState(data: *const u8, size: usize, state: *mut *mut c_void);
         }
-        $crate::no_variables! { $model,
+        $crate::no_variables! { $instance,
             fmi3GetFloat32 "Float32" true *mut f32; fmi3GetInt8 "Int8" true *mut i8; fmi3GetUInt8 "UInt8" true *mut u8;
             fmi3GetInt16 "Int16" true *mut i16; fmi3GetUInt16 "UInt16" true *mut u16; fmi3GetUInt32 "UInt32" true *mut u32;
             fmi3GetUInt64 "UInt64" true *mut u64; fmi3GetString "String" true *mut *const c_char;
@@ -170,7 +178,7 @@ macro_rules! export_fmi3 {
             fmi3SetInt16 "Int16" false *const i16; fmi3SetUInt16 "UInt16" false *const u16; fmi3SetUInt32 "UInt32" false *const u32;
             fmi3SetUInt64 "UInt64" false *const u64; fmi3SetString "String" false *const *const c_char;
         }
-        $crate::unsupported! { $model, fmi3_unsupported fmi3,
+        $crate::unsupported! { $instance, fmi3_unsupported fmi3,
             "there are no Binary variables":
             fmi3GetBinary(vr: *const u32, n: usize, sizes: *mut usize, values: *mut *const u8, n_values: usize);
             fmi3SetBinary(vr: *const u32, n: usize, sizes: *const usize, values: *const *const u8, n_values: usize);
@@ -213,7 +221,7 @@ macro_rules! export_fmi3 {
                 environment: *mut c_void, log_message: Option<LogMessage>, intermediate_update: *const c_void,
             ) -> *mut c_void {
                 // SAFETY: the arguments as the host passes them.
-                unsafe { fmi3::fmi3InstantiateCoSimulation::<$model>(token, event_mode_used, environment, log_message) }
+                unsafe { fmi3::fmi3InstantiateCoSimulation::<$instance>(token, resources, event_mode_used, environment, log_message) }
             }
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi3InstantiateModelExchange(
@@ -221,7 +229,7 @@ macro_rules! export_fmi3 {
                 environment: *mut c_void, log_message: Option<LogMessage>,
             ) -> *mut c_void {
                 // SAFETY: the arguments as the host passes them.
-                unsafe { fmi3::fmi3InstantiateModelExchange::<$model>(token, environment, log_message) }
+                unsafe { fmi3::fmi3InstantiateModelExchange::<$instance>(token, resources, environment, log_message) }
             }
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi3InstantiateScheduledExecution(
@@ -235,14 +243,14 @@ macro_rules! export_fmi3 {
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi3FreeInstance(instance: *mut c_void) {
                 // SAFETY: the instance as the host passes it.
-                unsafe { fmi3::fmi3FreeInstance::<$model>(instance) }
+                unsafe { fmi3::fmi3FreeInstance::<$instance>(instance) }
             }
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi3EnterInitializationMode(
                 instance: *mut c_void, tolerance_defined: u8, tolerance: f64, start: f64, stop_defined: u8, stop: f64,
             ) -> Status {
                 // SAFETY: the arguments as the host passes them.
-                unsafe { fmi3::fmi3EnterInitializationMode::<$model>(instance, start, stop_defined, stop) }
+                unsafe { fmi3::fmi3EnterInitializationMode::<$instance>(instance, start, stop_defined, stop) }
             }
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi3DoStep(
@@ -250,7 +258,7 @@ macro_rules! export_fmi3 {
                 terminate: *mut u8, early_return: *mut u8, last_successful_time: *mut f64,
             ) -> Status {
                 // SAFETY: the arguments as the host passes them.
-                unsafe { fmi3::fmi3DoStep::<$model>(instance, t, step, event_handling_needed, terminate, early_return, last_successful_time) }
+                unsafe { fmi3::fmi3DoStep::<$instance>(instance, t, step, event_handling_needed, terminate, early_return, last_successful_time) }
             }
         }
     };
@@ -260,7 +268,7 @@ macro_rules! export_fmi3 {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! functions {
-    ($model:ty, $module:ident $standard:ident, $($name:ident($($arg:ident: $type:ty),*);)*) => {
+    ($instance:ty, $module:ident $standard:ident, $($name:ident($($arg:ident: $type:ty),*);)*) => {
         #[allow(unsafe_code, non_snake_case, missing_docs, clippy::too_many_arguments, clippy::missing_safety_doc, reason = "C interface of FMI")]
         mod $module {
             use std::ffi::{c_char, c_void};
@@ -270,7 +278,7 @@ macro_rules! functions {
                 #[unsafe(no_mangle)]
                 pub unsafe extern "C" fn $name(instance: *mut c_void, $($arg: $type),*) -> Status {
                     // SAFETY: the arguments as the host passes them.
-                    unsafe { $standard::$name::<$model>(instance, $($arg),*) }
+                    unsafe { $standard::$name::<$instance>(instance, $($arg),*) }
                 }
             )*
         }
@@ -281,7 +289,7 @@ macro_rules! functions {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! no_variables {
-    ($model:ty, $($name:ident $called:literal $get:literal $type:ty;)*) => {
+    ($instance:ty, $($name:ident $called:literal $get:literal $type:ty;)*) => {
         #[allow(unsafe_code, non_snake_case, missing_docs, unused_variables, clippy::missing_safety_doc, reason = "C interface of FMI")]
         mod fmi3_other_types {
             use std::ffi::{c_char, c_void};
@@ -291,7 +299,7 @@ macro_rules! no_variables {
                 #[unsafe(no_mangle)]
                 pub unsafe extern "C" fn $name(instance: *mut c_void, vr: *const u32, n: usize, values: $type, n_values: usize) -> Status {
                     // SAFETY: the arguments as the host passes them.
-                    unsafe { fmi3::no_variables::<$model>(instance, $get, $called, vr, n, n_values) }
+                    unsafe { fmi3::no_variables::<$instance>(instance, $get, $called, vr, n, n_values) }
                 }
             )*
         }
@@ -302,7 +310,7 @@ macro_rules! no_variables {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! unsupported {
-    ($model:ty, $module:ident $standard:ident, $($reason:literal: $($name:ident($($arg:ident: $type:ty),*);)*)*) => {
+    ($instance:ty, $module:ident $standard:ident, $($reason:literal: $($name:ident($($arg:ident: $type:ty),*);)*)*) => {
         #[allow(unsafe_code, non_snake_case, missing_docs, unused_variables, clippy::too_many_arguments, clippy::missing_safety_doc, reason = "C interface of FMI")]
         mod $module {
             use std::ffi::{c_char, c_void};
@@ -312,7 +320,7 @@ macro_rules! unsupported {
                 #[unsafe(no_mangle)]
                 pub unsafe extern "C" fn $name(instance: *mut c_void, $($arg: $type),*) -> Status {
                     // SAFETY: the arguments as the host passes them.
-                    unsafe { $standard::unsupported::<$model>(instance, stringify!($name), $reason) }
+                    unsafe { $standard::unsupported::<$instance>(instance, stringify!($name), $reason) }
                 }
             )*)*
         }

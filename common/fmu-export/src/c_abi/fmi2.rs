@@ -2,13 +2,14 @@
 
 use std::ffi::{CStr, CString, c_char, c_void};
 
-use model::{Kind, Model};
+use model::Kind;
 
 use super::log::{Callback, Log, Logger};
 use super::shared::{self, forward, lists, methods, whole_numbers};
-use super::{array, array_mut, call, put};
+use super::{array, array_mut, call, put, text};
 use crate::phase::{Interface, fmi2 as phase};
-use crate::{Fault, Status};
+use crate::resources::path_of_uri;
+use crate::{Exported, Fault, Status};
 
 /// `fmi2Boolean`: any value but 0 is true.
 pub type Bool = i32;
@@ -61,10 +62,11 @@ pub fn fmi2GetVersion() -> *const c_char {
 
 #[doc(hidden)]
 #[must_use]
-pub unsafe fn fmi2Instantiate<M: Model>(
+pub unsafe fn fmi2Instantiate<I: Exported>(
     name: *const c_char,
     interface: u32,
     guid: *const c_char,
+    resources: *const c_char,
     functions: *const CallbackFunctions,
 ) -> *mut c_void {
     // SAFETY: null, or the host's structure and string; both are copied.
@@ -80,28 +82,31 @@ pub unsafe fn fmi2Instantiate<M: Model>(
         other => return log.refusal("fmi2Instantiate", &format!("fmuType = {other}; allowed: 0, 1")),
     };
     // SAFETY: the arguments as the host passes them.
-    unsafe { super::instantiate::<M>("fmi2Instantiate", interface, ("fmuGUID", guid), log) }
+    unsafe {
+        let resources = path_of_uri(&text(resources));
+        super::instantiate::<I>("fmi2Instantiate", interface, ("fmuGUID", guid), resources.as_deref(), log)
+    }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi2FreeInstance<M: Model>(instance: *mut c_void) {
+pub unsafe fn fmi2FreeInstance<I: Exported>(instance: *mut c_void) {
     // SAFETY: the instance as the host passes it.
-    unsafe { super::free_instance::<M>(instance) }
+    unsafe { super::free_instance::<I>(instance) }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi2SetDebugLogging<M: Model>(
+pub unsafe fn fmi2SetDebugLogging<I: Exported>(
     instance: *mut c_void,
     on: Bool,
     n: usize,
     categories: *const *const c_char,
 ) -> Status {
     // SAFETY: the arguments as the host passes them.
-    unsafe { shared::set_debug_logging::<M>(instance, &phase::SET_DEBUG_LOGGING, on != 0, n, categories) }
+    unsafe { shared::set_debug_logging::<I>(instance, &phase::SET_DEBUG_LOGGING, on != 0, n, categories) }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi2SetupExperiment<M: Model>(
+pub unsafe fn fmi2SetupExperiment<I: Exported>(
     instance: *mut c_void,
     start: f64,
     stop_defined: Bool,
@@ -109,7 +114,7 @@ pub unsafe fn fmi2SetupExperiment<M: Model>(
 ) -> Status {
     // SAFETY: FMI instance, checked for null by `call`.
     unsafe {
-        call::<M>(instance, &phase::SETUP_EXPERIMENT, |c| {
+        call::<I>(instance, &phase::SETUP_EXPERIMENT, |c| {
             c.instance.setup_experiment(start, (stop_defined != 0).then_some(stop))
         })
     }
@@ -139,47 +144,47 @@ lists! {
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi2SerializeFMUstate<M: Model>(
+pub unsafe fn fmi2SerializeFMUstate<I: Exported>(
     instance: *mut c_void,
     state: *mut c_void,
     data: *mut c_char,
     size: usize,
 ) -> Status {
     // SAFETY: the arguments as the host passes them.
-    unsafe { shared::serialise::<M>(instance, &phase::SERIALISE, state, data.cast(), size) }
+    unsafe { shared::serialise::<I>(instance, &phase::SERIALISE, state, data.cast(), size) }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi2DeSerializeFMUstate<M: Model>(
+pub unsafe fn fmi2DeSerializeFMUstate<I: Exported>(
     instance: *mut c_void,
     data: *const c_char,
     size: usize,
     state: *mut *mut c_void,
 ) -> Status {
     // SAFETY: the arguments as the host passes them.
-    unsafe { shared::deserialise::<M>(instance, &phase::DESERIALISE, data.cast(), size, state) }
+    unsafe { shared::deserialise::<I>(instance, &phase::DESERIALISE, data.cast(), size, state) }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi2GetReal<M: Model>(
+pub unsafe fn fmi2GetReal<I: Exported>(
     instance: *mut c_void,
     references: *const u32,
     n: usize,
     values: *mut f64,
 ) -> Status {
     // SAFETY: the arguments as the host passes them.
-    unsafe { shared::get_reals::<M>(instance, &phase::GET_REAL, references, n, values, n) }
+    unsafe { shared::get_reals::<I>(instance, &phase::GET_REAL, references, n, values, n) }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi2SetReal<M: Model>(
+pub unsafe fn fmi2SetReal<I: Exported>(
     instance: *mut c_void,
     references: *const u32,
     n: usize,
     values: *const f64,
 ) -> Status {
     // SAFETY: the arguments as the host passes them.
-    unsafe { shared::set_reals::<M>(instance, &phase::SET_REAL, references, n, values, n) }
+    unsafe { shared::set_reals::<I>(instance, &phase::SET_REAL, references, n, values, n) }
 }
 
 /// A whole number as `fmi2Integer`, if it is not too large.
@@ -192,29 +197,29 @@ whole_numbers!(fmi2GetInteger GET_INTEGER fmi2SetInteger SET_INTEGER i32, (), "I
 whole_numbers!(fmi2GetBoolean GET_BOOLEAN fmi2SetBoolean SET_BOOLEAN Bool, (), "Boolean", Kind::Boolean, |v| f64::from(u8::from(v != 0)), |v| Some(i32::from(v > 0.5)));
 
 #[doc(hidden)]
-pub unsafe fn fmi2GetString<M: Model>(
+pub unsafe fn fmi2GetString<I: Exported>(
     instance: *mut c_void,
     references: *const u32,
     n: usize,
     _values: *mut *const c_char,
 ) -> Status {
     // SAFETY: the arguments as the host passes them.
-    unsafe { shared::no_variables::<M>(instance, &phase::GET_STRING, "String", (references, n), n) }
+    unsafe { shared::no_variables::<I>(instance, &phase::GET_STRING, "String", (references, n), n) }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi2SetString<M: Model>(
+pub unsafe fn fmi2SetString<I: Exported>(
     instance: *mut c_void,
     references: *const u32,
     n: usize,
     _values: *const *const c_char,
 ) -> Status {
     // SAFETY: the arguments as the host passes them.
-    unsafe { shared::no_variables::<M>(instance, &phase::SET_STRING, "String", (references, n), n) }
+    unsafe { shared::no_variables::<I>(instance, &phase::SET_STRING, "String", (references, n), n) }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi2GetDirectionalDerivative<M: Model>(
+pub unsafe fn fmi2GetDirectionalDerivative<I: Exported>(
     instance: *mut c_void,
     unknowns: *const u32,
     n_unknowns: usize,
@@ -225,7 +230,7 @@ pub unsafe fn fmi2GetDirectionalDerivative<M: Model>(
 ) -> Status {
     // SAFETY: the arguments as the host passes them.
     unsafe {
-        shared::directional_derivative::<M>(
+        shared::directional_derivative::<I>(
             instance,
             &phase::DIRECTIONAL_DERIVATIVE,
             (unknowns, n_unknowns),
@@ -237,10 +242,10 @@ pub unsafe fn fmi2GetDirectionalDerivative<M: Model>(
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi2NewDiscreteStates<M: Model>(instance: *mut c_void, info: *mut EventInfo) -> Status {
+pub unsafe fn fmi2NewDiscreteStates<I: Exported>(instance: *mut c_void, info: *mut EventInfo) -> Status {
     // SAFETY: FMI pointers, checked for null by `call` and `array_mut`.
     unsafe {
-        call::<M>(instance, &phase::NEW_DISCRETE_STATES, |c| {
+        call::<I>(instance, &phase::NEW_DISCRETE_STATES, |c| {
             let info = &mut array_mut("eventInfo", info, 1)?[0];
             let event = c.instance.update_discrete_states()?;
             info.again = Bool::from(event.again);
@@ -256,7 +261,7 @@ pub unsafe fn fmi2NewDiscreteStates<M: Model>(instance: *mut c_void, info: *mut 
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi2CompletedIntegratorStep<M: Model>(
+pub unsafe fn fmi2CompletedIntegratorStep<I: Exported>(
     instance: *mut c_void,
     _no_set_state_prior: Bool,
     enter_event_mode: *mut Bool,
@@ -264,7 +269,7 @@ pub unsafe fn fmi2CompletedIntegratorStep<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null by `call` and `array_mut`.
     unsafe {
-        call::<M>(instance, &phase::COMPLETED_INTEGRATOR_STEP, |c| {
+        call::<I>(instance, &phase::COMPLETED_INTEGRATOR_STEP, |c| {
             put("terminateSimulation", terminate, 0)?;
             let event = &mut array_mut("enterEventMode", enter_event_mode, 1)?[0];
             *event = Bool::from(c.instance.completed_integrator_step()?);
@@ -274,9 +279,9 @@ pub unsafe fn fmi2CompletedIntegratorStep<M: Model>(
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi2DoStep<M: Model>(instance: *mut c_void, t: f64, step: f64) -> Status {
+pub unsafe fn fmi2DoStep<I: Exported>(instance: *mut c_void, t: f64, step: f64) -> Status {
     // SAFETY: FMI instance, checked for null by `call`.
-    unsafe { call::<M>(instance, &phase::DO_STEP, |c| c.instance.do_step(t, step).map(|_| ())) }
+    unsafe { call::<I>(instance, &phase::DO_STEP, |c| c.instance.do_step(t, step).map(|_| ())) }
 }
 
 /// `fmi2LastSuccessfulTime` of `fmi2StatusKind`
@@ -289,10 +294,10 @@ macro_rules! status {
     ($($name:ident $rule:ident $type:ty, $kind:pat => $answer:expr;)*) => {
         $(
             #[doc(hidden)]
-            pub unsafe fn $name<M: Model>(instance: *mut c_void, kind: u32, value: *mut $type) -> Status {
+            pub unsafe fn $name<I: Exported>(instance: *mut c_void, kind: u32, value: *mut $type) -> Status {
                 // SAFETY: FMI pointers, checked for null.
                 unsafe {
-                    call::<M>(instance, &phase::$rule, |c| match kind {
+                    call::<I>(instance, &phase::$rule, |c| match kind {
                         $kind => put("value", value, $answer(&c.instance)),
                         _ => Err(Fault::NoStatus { kind }),
                     })
@@ -302,8 +307,8 @@ macro_rules! status {
     };
 }
 status! {
-    fmi2GetRealStatus GET_REAL_STATUS f64, LAST_SUCCESSFUL_TIME => crate::Instance::<M>::time;
-    fmi2GetBooleanStatus GET_BOOLEAN_STATUS Bool, TERMINATED => |_: &crate::Instance<M>| 0;
+    fmi2GetRealStatus GET_REAL_STATUS f64, LAST_SUCCESSFUL_TIME => I::time;
+    fmi2GetBooleanStatus GET_BOOLEAN_STATUS Bool, TERMINATED => |_: &I| 0;
 }
 
 /// Functions that would say something about a step in the background.
@@ -311,9 +316,9 @@ macro_rules! no_status {
     ($($name:ident $rule:ident $type:ty;)*) => {
         $(
             #[doc(hidden)]
-            pub unsafe fn $name<M: Model>(instance: *mut c_void, kind: u32, _value: *mut $type) -> Status {
+            pub unsafe fn $name<I: Exported>(instance: *mut c_void, kind: u32, _value: *mut $type) -> Status {
                 // SAFETY: FMI instance, checked for null by `call`.
-                unsafe { call::<M>(instance, &phase::$rule, |_| Err(Fault::NoStatus { kind })) }
+                unsafe { call::<I>(instance, &phase::$rule, |_| Err(Fault::NoStatus { kind })) }
             }
         )*
     };
@@ -325,13 +330,13 @@ no_status! {
 }
 
 #[doc(hidden)]
-pub unsafe fn unsupported<M: Model>(
+pub unsafe fn unsupported<I: Exported>(
     instance: *mut c_void,
     function: &'static str,
     reason: &'static str,
 ) -> Status {
     // SAFETY: the instance as the host passes it.
-    unsafe { shared::unsupported::<M>(instance, &phase::UNSUPPORTED, function, reason) }
+    unsafe { shared::unsupported::<I>(instance, &phase::UNSUPPORTED, function, reason) }
 }
 
 #[cfg(test)]

@@ -1,14 +1,15 @@
 //! FMI 3.0: its signatures, and what only it has.
 
 use std::ffi::{c_char, c_void};
+use std::path::Path;
 
-use model::{Kind, Model};
+use model::Kind;
 
 use super::log::{Callback, Log, LogMessage};
 use super::shared::{self, forward, lists, methods, whole_numbers};
-use super::{array, array_mut, call, put};
-use crate::Status;
+use super::{array, array_mut, call, put, text};
 use crate::phase::{Interface, fmi3 as phase};
+use crate::{Exported, Status};
 
 /// `fmi3Boolean` as it comes over the boundary: any non-zero byte is true.
 pub type Bool = u8;
@@ -20,8 +21,9 @@ pub fn fmi3GetVersion() -> *const c_char {
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
+pub unsafe fn fmi3InstantiateCoSimulation<I: Exported>(
     token: *const c_char,
+    resources: *const c_char,
     event_mode_used: Bool,
     environment: *mut c_void,
     log_message: Option<LogMessage>,
@@ -31,20 +33,27 @@ pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
     let log = Log::new(environment, Callback::Fmi3(log_message));
     // SAFETY: the arguments as the host passes them; the same below.
     unsafe {
-        super::instantiate::<M>("fmi3InstantiateCoSimulation", interface, ("instantiationToken", token), log)
+        let (function, resources) = ("fmi3InstantiateCoSimulation", text(resources));
+        let resources = (!resources.is_empty()).then_some(Path::new(&resources));
+        super::instantiate::<I>(function, interface, ("instantiationToken", token), resources, log)
     }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi3InstantiateModelExchange<M: Model>(
+pub unsafe fn fmi3InstantiateModelExchange<I: Exported>(
     token: *const c_char,
+    resources: *const c_char,
     environment: *mut c_void,
     log_message: Option<LogMessage>,
 ) -> *mut c_void {
     let (function, interface) = ("fmi3InstantiateModelExchange", Interface::ModelExchange);
     let log = Log::new(environment, Callback::Fmi3(log_message));
     // SAFETY: see above.
-    unsafe { super::instantiate::<M>(function, interface, ("instantiationToken", token), log) }
+    unsafe {
+        let resources = text(resources);
+        let resources = (!resources.is_empty()).then_some(Path::new(&resources));
+        super::instantiate::<I>(function, interface, ("instantiationToken", token), resources, log)
+    }
 }
 
 #[doc(hidden)]
@@ -57,24 +66,24 @@ pub unsafe fn fmi3InstantiateScheduledExecution(
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi3FreeInstance<M: Model>(instance: *mut c_void) {
+pub unsafe fn fmi3FreeInstance<I: Exported>(instance: *mut c_void) {
     // SAFETY: the instance as the host passes it.
-    unsafe { super::free_instance::<M>(instance) }
+    unsafe { super::free_instance::<I>(instance) }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi3SetDebugLogging<M: Model>(
+pub unsafe fn fmi3SetDebugLogging<I: Exported>(
     instance: *mut c_void,
     on: Bool,
     n: usize,
     categories: *const *const c_char,
 ) -> Status {
     // SAFETY: the arguments as the host passes them.
-    unsafe { shared::set_debug_logging::<M>(instance, &phase::SET_DEBUG_LOGGING, on != 0, n, categories) }
+    unsafe { shared::set_debug_logging::<I>(instance, &phase::SET_DEBUG_LOGGING, on != 0, n, categories) }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi3EnterInitializationMode<M: Model>(
+pub unsafe fn fmi3EnterInitializationMode<I: Exported>(
     instance: *mut c_void,
     start: f64,
     stop_defined: Bool,
@@ -82,7 +91,7 @@ pub unsafe fn fmi3EnterInitializationMode<M: Model>(
 ) -> Status {
     // SAFETY: FMI instance, checked for null by `call`.
     unsafe {
-        call::<M>(instance, &phase::ENTER_INITIALIZATION, |c| {
+        call::<I>(instance, &phase::ENTER_INITIALIZATION, |c| {
             c.instance.enter_initialization(start, (stop_defined != 0).then_some(stop))
         })
     }
@@ -116,7 +125,7 @@ lists! {
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi3DoStep<M: Model>(
+pub unsafe fn fmi3DoStep<I: Exported>(
     instance: *mut c_void,
     t: f64,
     step: f64,
@@ -127,7 +136,7 @@ pub unsafe fn fmi3DoStep<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null by `call` and `array_mut`.
     unsafe {
-        call::<M>(instance, &phase::DO_STEP, |c| {
+        call::<I>(instance, &phase::DO_STEP, |c| {
             let flags = [
                 ("eventHandlingNeeded", event_handling_needed),
                 ("terminateSimulation", terminate_simulation),
@@ -149,7 +158,7 @@ pub unsafe fn fmi3DoStep<M: Model>(
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi3UpdateDiscreteStates<M: Model>(
+pub unsafe fn fmi3UpdateDiscreteStates<I: Exported>(
     instance: *mut c_void,
     need_update: *mut Bool,
     terminate: *mut Bool,
@@ -160,7 +169,7 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null by `call` and `array_mut`.
     unsafe {
-        call::<M>(instance, &phase::UPDATE_DISCRETE_STATES, |c| {
+        call::<I>(instance, &phase::UPDATE_DISCRETE_STATES, |c| {
             let flags = [
                 ("discreteStatesNeedUpdate", need_update),
                 ("terminateSimulation", terminate),
@@ -186,7 +195,7 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Model>(
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi3CompletedIntegratorStep<M: Model>(
+pub unsafe fn fmi3CompletedIntegratorStep<I: Exported>(
     instance: *mut c_void,
     _no_set_state_prior: Bool,
     enter_event_mode: *mut Bool,
@@ -194,7 +203,7 @@ pub unsafe fn fmi3CompletedIntegratorStep<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null by `call` and `array_mut`.
     unsafe {
-        call::<M>(instance, &phase::COMPLETED_INTEGRATOR_STEP, |c| {
+        call::<I>(instance, &phase::COMPLETED_INTEGRATOR_STEP, |c| {
             put("terminateSimulation", terminate, 0)?;
             let event = &mut array_mut("enterEventMode", enter_event_mode, 1)?[0];
             *event = u8::from(c.instance.completed_integrator_step()?);
@@ -208,10 +217,10 @@ macro_rules! counts {
     ($($name:ident $rule:ident $method:ident;)*) => {
         $(
             #[doc(hidden)]
-            pub unsafe fn $name<M: Model>(instance: *mut c_void, n: *mut usize) -> Status {
+            pub unsafe fn $name<I: Exported>(instance: *mut c_void, n: *mut usize) -> Status {
                 // SAFETY: FMI pointers, checked for null.
                 unsafe {
-                    call::<M>(instance, &phase::$rule, |c| {
+                    call::<I>(instance, &phase::$rule, |c| {
                         put("count", n, c.instance.$method())
                     })
                 }
@@ -230,7 +239,7 @@ counts! {
     reason = "stored values are whole and below 2^53"
 )]
 mod whole {
-    use super::{Bool, Kind, Model, Status, array, array_mut, c_void, call, phase, whole_numbers};
+    use super::{Bool, Exported, Kind, Status, array, array_mut, c_void, call, phase, whole_numbers};
     whole_numbers!(fmi3GetInt64 GET_INT64 fmi3SetInt64 SET_INT64 i64, (n_values), "Int64", Kind::Int64 | Kind::Enumeration(_), |v| v as f64, |v| Some(v as i64));
     whole_numbers!(fmi3GetInt32 GET_INT32 fmi3SetInt32 SET_INT32 i32, (n_values), "Int32", Kind::Int32, f64::from, |v| Some(v as i32));
     whole_numbers!(fmi3GetBoolean GET_BOOLEAN fmi3SetBoolean SET_BOOLEAN Bool, (n_values), "Boolean", Kind::Boolean, |v| f64::from(u8::from(v != 0)), |v| Some(u8::from(v > 0.5)));
@@ -239,7 +248,7 @@ mod whole {
 pub use whole::*;
 
 #[doc(hidden)]
-pub unsafe fn no_variables<M: Model>(
+pub unsafe fn no_variables<I: Exported>(
     instance: *mut c_void,
     get: bool,
     called: &'static str,
@@ -249,21 +258,21 @@ pub unsafe fn no_variables<M: Model>(
 ) -> Status {
     let rule = if get { &phase::GET_OTHER } else { &phase::SET_OTHER };
     // SAFETY: the arguments as the host passes them.
-    unsafe { shared::no_variables::<M>(instance, rule, called, (references, n), n_values) }
+    unsafe { shared::no_variables::<I>(instance, rule, called, (references, n), n_values) }
 }
 
 #[doc(hidden)]
-pub unsafe fn unsupported<M: Model>(
+pub unsafe fn unsupported<I: Exported>(
     instance: *mut c_void,
     function: &'static str,
     reason: &'static str,
 ) -> Status {
     // SAFETY: the instance as the host passes it.
-    unsafe { shared::unsupported::<M>(instance, &phase::UNSUPPORTED, function, reason) }
+    unsafe { shared::unsupported::<I>(instance, &phase::UNSUPPORTED, function, reason) }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
+pub unsafe fn fmi3GetDirectionalDerivative<I: Exported>(
     instance: *mut c_void,
     unknowns: *const u32,
     n_unknowns: usize,
@@ -276,7 +285,7 @@ pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
 ) -> Status {
     // SAFETY: the arguments as the host passes them.
     unsafe {
-        shared::directional_derivative::<M>(
+        shared::directional_derivative::<I>(
             instance,
             &phase::DIRECTIONAL_DERIVATIVE,
             (unknowns, n_unknowns),
@@ -288,21 +297,21 @@ pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Model>(
+pub unsafe fn fmi3GetNumberOfVariableDependencies<I: Exported>(
     instance: *mut c_void,
     reference: u32,
     n: *mut usize,
 ) -> Status {
     // SAFETY: FMI pointers, checked for null.
     unsafe {
-        call::<M>(instance, &phase::DEPENDENCIES, |c| {
+        call::<I>(instance, &phase::DEPENDENCIES, |c| {
             put("nDependencies", n, c.instance.dependencies(reference)?.len())
         })
     }
 }
 
 #[doc(hidden)]
-pub unsafe fn fmi3GetVariableDependencies<M: Model>(
+pub unsafe fn fmi3GetVariableDependencies<I: Exported>(
     instance: *mut c_void,
     dependent: u32,
     elements_of_dependent: *mut usize,
@@ -315,7 +324,7 @@ pub unsafe fn fmi3GetVariableDependencies<M: Model>(
     const DEPENDENT: u32 = 4;
     // SAFETY: FMI pointers, checked for null.
     unsafe {
-        call::<M>(instance, &phase::DEPENDENCIES, |c| {
+        call::<I>(instance, &phase::DEPENDENCIES, |c| {
             let found = c.instance.dependencies(dependent)?;
             crate::values::same_length(found.len(), n)?;
             array_mut("elementIndicesOfDependent", elements_of_dependent, n)?.fill(0);

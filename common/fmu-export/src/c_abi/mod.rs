@@ -19,18 +19,17 @@ mod shared;
 
 use std::ffi::{CStr, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-
-use model::Model;
+use std::path::Path;
 
 pub use log::{LOG_CATEGORIES, LogMessage, Logger};
 use log::{Log, WARNING_CATEGORY};
 
 use crate::phase::{Interface, Rule};
-use crate::{Fault, Instance, Status};
+use crate::{CreationError, Exported, Fault, Status};
 
 /// What an instance pointer of FMI points to.
-struct Component<M: Model> {
-    instance: Instance<M>,
+struct Component<I: Exported> {
+    instance: I,
     log: Log,
 }
 
@@ -38,13 +37,13 @@ struct Component<M: Model> {
 ///
 /// # Safety
 /// `instance` is null or came from [`instantiate`] and was not freed.
-unsafe fn call<M: Model>(
+unsafe fn call<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
-    body: impl FnOnce(&mut Component<M>) -> Result<(), Fault>,
+    body: impl FnOnce(&mut Component<I>) -> Result<(), Fault>,
 ) -> Status {
     // SAFETY: by the contract of this function; FMI forbids concurrent calls on one instance.
-    let Some(component) = (unsafe { instance.cast::<Component<M>>().as_mut() }) else {
+    let Some(component) = (unsafe { instance.cast::<Component<I>>().as_mut() }) else {
         return Status::Error;
     };
     let result = catch_unwind(AssertUnwindSafe(|| {
@@ -124,22 +123,20 @@ unsafe fn text(pointer: *const c_char) -> String {
 ///
 /// # Safety
 /// The token is null or a null-terminated string; the log's callback and environment are the host's.
-unsafe fn instantiate<M: Model>(
+unsafe fn instantiate<I: Exported>(
     function: &str,
     interface: Interface,
     (token_name, token): (&str, *const c_char),
+    resources: Option<&Path>,
     log: Log,
 ) -> *mut c_void {
     let created = catch_unwind(|| {
         // SAFETY: by the contract of this function.
-        let (given, expected) = (unsafe { text(token) }, Instance::<M>::token());
-        if given != expected {
-            return Err(format!("{token_name} is \"{given}\"; this binary belongs to \"{expected}\""));
-        }
-        if interface.is_model_exchange() && !M::MODEL_EXCHANGE {
-            return Err("Model Exchange is not supported: this is a Co-Simulation FMU".into());
-        }
-        Ok(Instance::<M>::with_interface(interface))
+        let given = unsafe { text(token) };
+        I::create(interface, &given, resources).map_err(|error| match error {
+            CreationError::Token { .. } => format!("{token_name} is \"{given}\"; {error}"),
+            other => other.to_string(),
+        })
     });
     match created {
         Ok(Ok(instance)) => Box::into_raw(Box::new(Component { instance, log })).cast(),
@@ -152,10 +149,10 @@ unsafe fn instantiate<M: Model>(
 ///
 /// # Safety
 /// `instance` is null or came from [`instantiate`] and was not freed.
-unsafe fn free_instance<M: Model>(instance: *mut c_void) {
+unsafe fn free_instance<I: Exported>(instance: *mut c_void) {
     if !instance.is_null() {
         // SAFETY: not null, created by `Box::into_raw` above, freed once (FMI).
-        let component = unsafe { Box::from_raw(instance.cast::<Component<M>>()) };
+        let component = unsafe { Box::from_raw(instance.cast::<Component<I>>()) };
         let _ = catch_unwind(AssertUnwindSafe(|| drop(component)));
     }
 }

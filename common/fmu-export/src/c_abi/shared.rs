@@ -2,20 +2,20 @@
 
 use std::ffi::{c_char, c_void};
 
-use model::{Kind, Model};
+use model::Kind;
 
 use super::{WARNING_CATEGORY, array, array_mut, call, put, text};
 use crate::phase::Rule;
-use crate::{Fault, SerialisedStateError, State, Status};
+use crate::{Exported, Fault, SerialisedStateError, Status};
 
 /// Functions that hand their arguments to a shared one with their own rule.
 macro_rules! forward {
     ($($name:ident($($arg:ident: $type:ty),*) $rule:ident $body:ident;)*) => {
         $(
             #[doc(hidden)]
-            pub unsafe fn $name<M: Model>(instance: *mut c_void, $($arg: $type),*) -> Status {
+            pub unsafe fn $name<I: Exported>(instance: *mut c_void, $($arg: $type),*) -> Status {
                 // SAFETY: the arguments as the host passes them.
-                unsafe { $crate::c_abi::shared::$body::<M>(instance, &phase::$rule, $($arg),*) }
+                unsafe { $crate::c_abi::shared::$body::<I>(instance, &phase::$rule, $($arg),*) }
             }
         )*
     };
@@ -26,9 +26,9 @@ macro_rules! methods {
     ($($name:ident($($arg:ident: $type:ty)?) $rule:ident $method:ident;)*) => {
         $(
             #[doc(hidden)]
-            pub unsafe fn $name<M: Model>(instance: *mut c_void, $($arg: $type)?) -> Status {
+            pub unsafe fn $name<I: Exported>(instance: *mut c_void, $($arg: $type)?) -> Status {
                 // SAFETY: FMI instance, checked for null by `call`.
-                unsafe { call::<M>(instance, &phase::$rule, |c| c.instance.$method($($arg)?)) }
+                unsafe { call::<I>(instance, &phase::$rule, |c| c.instance.$method($($arg)?)) }
             }
         )*
     };
@@ -39,10 +39,10 @@ macro_rules! lists {
     ($($name:ident $rule:ident $method:ident;)*) => {
         $(
             #[doc(hidden)]
-            pub unsafe fn $name<M: Model>(instance: *mut c_void, values: *mut f64, n: usize) -> Status {
+            pub unsafe fn $name<I: Exported>(instance: *mut c_void, values: *mut f64, n: usize) -> Status {
                 // SAFETY: FMI pointers, checked for null.
                 unsafe {
-                    call::<M>(instance, &phase::$rule, |c| {
+                    call::<I>(instance, &phase::$rule, |c| {
                         c.instance.$method(array_mut("values", values, n)?)
                     })
                 }
@@ -55,7 +55,7 @@ macro_rules! lists {
 macro_rules! whole_numbers {
     ($get:ident $get_rule:ident $set:ident $set_rule:ident $type:ty, ($($count:ident)?), $called:literal, $is:pat, $from:expr, $to:expr) => {
         #[doc(hidden)]
-        pub unsafe fn $get<M: Model>(
+        pub unsafe fn $get<I: Exported>(
             instance: *mut c_void,
             references: *const u32,
             n: usize,
@@ -67,7 +67,7 @@ macro_rules! whole_numbers {
             $(let n_values = $count;)?
             // SAFETY: FMI pointers, checked for null.
             unsafe {
-                call::<M>(instance, &phase::$get_rule, |c| {
+                call::<I>(instance, &phase::$get_rule, |c| {
                     let references = array("valueReferences", references, n)?;
                     let values = array_mut("values", values, n_values)?;
                     $crate::values::same_length(n, n_values)?;
@@ -80,7 +80,7 @@ macro_rules! whole_numbers {
         }
 
         #[doc(hidden)]
-        pub unsafe fn $set<M: Model>(
+        pub unsafe fn $set<I: Exported>(
             instance: *mut c_void,
             references: *const u32,
             n: usize,
@@ -92,7 +92,7 @@ macro_rules! whole_numbers {
             $(let n_values = $count;)?
             // SAFETY: FMI pointers, checked for null.
             unsafe {
-                call::<M>(instance, &phase::$set_rule, |c| {
+                call::<I>(instance, &phase::$set_rule, |c| {
                     let references = array("valueReferences", references, n)?;
                     let values = array("values", values, n_values)?;
                     $crate::values::same_length(n, n_values)?;
@@ -107,7 +107,7 @@ macro_rules! whole_numbers {
 pub(super) use {forward, lists, methods, whole_numbers};
 
 /// Switch log categories on or off: those named, or all.
-pub(super) unsafe fn set_debug_logging<M: Model>(
+pub(super) unsafe fn set_debug_logging<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
     on: bool,
@@ -116,7 +116,7 @@ pub(super) unsafe fn set_debug_logging<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null by `call`, `array` and `text`.
     unsafe {
-        call::<M>(instance, rule, |c| {
+        call::<I>(instance, rule, |c| {
             let names: Vec<_> = array("categories", categories, n)?.iter().map(|name| text(*name)).collect();
             c.log.choose(on, &names)
         })
@@ -124,11 +124,11 @@ pub(super) unsafe fn set_debug_logging<M: Model>(
 }
 
 /// End of initialisation, with the warnings of the model.
-pub(super) unsafe fn exit_initialization<M: Model>(instance: *mut c_void, rule: &Rule) -> Status {
+pub(super) unsafe fn exit_initialization<I: Exported>(instance: *mut c_void, rule: &Rule) -> Status {
     let mut warned = false;
     // SAFETY: FMI instance, checked for null by `call`; the same for the functions below.
     let status = unsafe {
-        call::<M>(instance, rule, |c| {
+        call::<I>(instance, rule, |c| {
             c.instance.exit_initialization()?;
             for warning in c.instance.take_warnings() {
                 c.log.send(Status::Warning, WARNING_CATEGORY, &warning);
@@ -140,27 +140,22 @@ pub(super) unsafe fn exit_initialization<M: Model>(instance: *mut c_void, rule: 
     if status == Status::Ok && warned { Status::Warning } else { status }
 }
 
-pub(super) unsafe fn terminate<M: Model>(instance: *mut c_void, rule: &Rule) -> Status {
+pub(super) unsafe fn terminate<I: Exported>(instance: *mut c_void, rule: &Rule) -> Status {
     // SAFETY: see above.
     unsafe {
-        call::<M>(instance, rule, |c| {
+        call::<I>(instance, rule, |c| {
             c.instance.terminate();
             Ok(())
         })
     }
 }
 
-pub(super) unsafe fn reset<M: Model>(instance: *mut c_void, rule: &Rule) -> Status {
+pub(super) unsafe fn reset<I: Exported>(instance: *mut c_void, rule: &Rule) -> Status {
     // SAFETY: see above.
-    unsafe {
-        call::<M>(instance, rule, |c| {
-            c.instance.reset();
-            Ok(())
-        })
-    }
+    unsafe { call::<I>(instance, rule, |c| c.instance.reset()) }
 }
 
-pub(super) unsafe fn set_continuous_states<M: Model>(
+pub(super) unsafe fn set_continuous_states<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
     states: *const f64,
@@ -168,11 +163,11 @@ pub(super) unsafe fn set_continuous_states<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null.
     unsafe {
-        call::<M>(instance, rule, |c| c.instance.set_continuous_states(array("continuousStates", states, n)?))
+        call::<I>(instance, rule, |c| c.instance.set_continuous_states(array("continuousStates", states, n)?))
     }
 }
 
-pub(super) unsafe fn get_reals<M: Model>(
+pub(super) unsafe fn get_reals<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
     references: *const u32,
@@ -182,14 +177,14 @@ pub(super) unsafe fn get_reals<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null.
     unsafe {
-        call::<M>(instance, rule, |c| {
+        call::<I>(instance, rule, |c| {
             let references = array("valueReferences", references, n)?;
             c.instance.get_float64(references, array_mut("values", values, n_values)?)
         })
     }
 }
 
-pub(super) unsafe fn set_reals<M: Model>(
+pub(super) unsafe fn set_reals<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
     references: *const u32,
@@ -199,7 +194,7 @@ pub(super) unsafe fn set_reals<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null.
     unsafe {
-        call::<M>(instance, rule, |c| {
+        call::<I>(instance, rule, |c| {
             let (references, values) =
                 (array("valueReferences", references, n)?, array("values", values, n_values)?);
             crate::values::same_length(n, n_values)?;
@@ -210,7 +205,7 @@ pub(super) unsafe fn set_reals<M: Model>(
 }
 
 /// Get or Set of a type of which there are no variables: right for none, an error for any.
-pub(super) unsafe fn no_variables<M: Model>(
+pub(super) unsafe fn no_variables<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
     called: &'static str,
@@ -219,7 +214,7 @@ pub(super) unsafe fn no_variables<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null.
     unsafe {
-        call::<M>(instance, rule, |c| {
+        call::<I>(instance, rule, |c| {
             let references = array("valueReferences", references, n)?;
             crate::values::same_length(n, n_values)?;
             c.instance.get_whole(references, called, |_| false, |_, _| true)
@@ -227,7 +222,7 @@ pub(super) unsafe fn no_variables<M: Model>(
     }
 }
 
-pub(super) unsafe fn directional_derivative<M: Model>(
+pub(super) unsafe fn directional_derivative<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
     (unknowns, n_unknowns): (*const u32, usize),
@@ -237,7 +232,7 @@ pub(super) unsafe fn directional_derivative<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null.
     unsafe {
-        call::<M>(instance, rule, |c| {
+        call::<I>(instance, rule, |c| {
             let unknowns = array("unknowns", unknowns, n_unknowns)?;
             let knowns = array("knowns", knowns, n_knowns)?;
             let seed = array("seed", seed, n_seed)?;
@@ -251,45 +246,49 @@ pub(super) unsafe fn directional_derivative<M: Model>(
 ///
 /// # Safety
 /// `state` is null or a state that was given out and not freed.
-unsafe fn saved<'a, M: Model>(state: *mut c_void) -> Result<&'a State<M>, Fault> {
+unsafe fn saved<'a, I: Exported>(state: *mut c_void) -> Result<&'a I::State, Fault> {
     // SAFETY: by the contract of this function.
-    unsafe { state.cast::<State<M>>().as_ref() }.ok_or(Fault::Null { argument: "FMUState" })
+    unsafe { state.cast::<I::State>().as_ref() }.ok_or(Fault::Null { argument: "FMUState" })
 }
 
-pub(super) unsafe fn get_state<M: Model>(
+pub(super) unsafe fn get_state<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
     state: *mut *mut c_void,
 ) -> Status {
     // SAFETY: FMI pointers, checked for null; a state that is not null was given out here.
     unsafe {
-        call::<M>(instance, rule, |c| {
+        call::<I>(instance, rule, |c| {
             let slot = &mut array_mut("FMUState", state, 1)?[0];
-            match slot.cast::<State<M>>().as_mut() {
-                Some(copy) => c.instance.save_into(copy),
-                None => *slot = Box::into_raw(c.instance.save()).cast(),
+            match slot.cast::<I::State>().as_mut() {
+                Some(copy) => c.instance.save_into(copy)?,
+                None => *slot = Box::into_raw(c.instance.save()?).cast(),
             }
             Ok(())
         })
     }
 }
 
-pub(super) unsafe fn set_state<M: Model>(instance: *mut c_void, rule: &Rule, state: *mut c_void) -> Status {
+pub(super) unsafe fn set_state<I: Exported>(
+    instance: *mut c_void,
+    rule: &Rule,
+    state: *mut c_void,
+) -> Status {
     // SAFETY: FMI pointers, checked for null; a state that is not null was given out here.
-    unsafe { call::<M>(instance, rule, |c| c.instance.restore(saved::<M>(state)?)) }
+    unsafe { call::<I>(instance, rule, |c| c.instance.restore(saved::<I>(state)?)) }
 }
 
-pub(super) unsafe fn free_state<M: Model>(
+pub(super) unsafe fn free_state<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
     state: *mut *mut c_void,
 ) -> Status {
     // SAFETY: a state that is not null came from `Box::into_raw` here.
     unsafe {
-        call::<M>(instance, rule, |_| {
+        call::<I>(instance, rule, |_| {
             let slot = &mut array_mut("FMUState", state, 1)?[0];
             if !slot.is_null() {
-                drop(Box::from_raw(slot.cast::<State<M>>()));
+                drop(Box::from_raw(slot.cast::<I::State>()));
                 *slot = std::ptr::null_mut();
             }
             Ok(())
@@ -297,7 +296,7 @@ pub(super) unsafe fn free_state<M: Model>(
     }
 }
 
-pub(super) unsafe fn serialised_size<M: Model>(
+pub(super) unsafe fn serialised_size<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
     state: *mut c_void,
@@ -305,11 +304,11 @@ pub(super) unsafe fn serialised_size<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null; a state that is not null was given out here.
     unsafe {
-        call::<M>(instance, rule, |c| put("size", size, c.instance.serialise(saved::<M>(state)?)?.len()))
+        call::<I>(instance, rule, |c| put("size", size, c.instance.serialise(saved::<I>(state)?)?.len()))
     }
 }
 
-pub(super) unsafe fn serialise<M: Model>(
+pub(super) unsafe fn serialise<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
     state: *mut c_void,
@@ -318,8 +317,8 @@ pub(super) unsafe fn serialise<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null; a state that is not null was given out here.
     unsafe {
-        call::<M>(instance, rule, |c| {
-            let bytes = c.instance.serialise(saved::<M>(state)?)?;
+        call::<I>(instance, rule, |c| {
+            let bytes = c.instance.serialise(saved::<I>(state)?)?;
             if size != bytes.len() {
                 return Err(SerialisedStateError::length(size, bytes.len()).into());
             }
@@ -329,7 +328,7 @@ pub(super) unsafe fn serialise<M: Model>(
     }
 }
 
-pub(super) unsafe fn deserialise<M: Model>(
+pub(super) unsafe fn deserialise<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
     data: *const u8,
@@ -338,7 +337,7 @@ pub(super) unsafe fn deserialise<M: Model>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null.
     unsafe {
-        call::<M>(instance, rule, |c| {
+        call::<I>(instance, rule, |c| {
             let slot = &mut array_mut("FMUState", state, 1)?[0];
             *slot = Box::into_raw(c.instance.deserialise(array("serializedState", data, size)?)?).cast();
             Ok(())
@@ -347,12 +346,12 @@ pub(super) unsafe fn deserialise<M: Model>(
 }
 
 /// A function that this FMU does not offer.
-pub(super) unsafe fn unsupported<M: Model>(
+pub(super) unsafe fn unsupported<I: Exported>(
     instance: *mut c_void,
     rule: &Rule,
     function: &'static str,
     reason: &'static str,
 ) -> Status {
     // SAFETY: FMI instance, checked for null by `call`.
-    unsafe { call::<M>(instance, &rule.named(function), |_| Err(Fault::Unsupported { reason })) }
+    unsafe { call::<I>(instance, &rule.named(function), |_| Err(Fault::Unsupported { reason })) }
 }

@@ -2,33 +2,31 @@
 
 use std::io;
 
-use model::Model;
-
 use super::{
-    Unknowns, Xml, default_experiment, enumerations, identity, items, leaf, list, log_categories, root,
-    typed, units,
+    Unknowns, Xml, default_experiment, enumerations, identity, interface, items, leaf, list, log_categories,
+    root, typed, units,
 };
-use crate::Standard;
 use crate::table::{Table, Variable};
+use crate::{Profile, Standard};
 
 /// Place in `ModelVariables` of the variable with a value reference.
 fn index(reference: usize) -> usize {
     reference + 1
 }
 
-pub(super) fn document<M: Model>(xml: &mut Xml, table: &Table) -> io::Result<()> {
-    let mut attributes = root::<M>(Standard::Fmi2, table, "guid");
-    if M::MODEL_EXCHANGE {
-        attributes.push(("numberOfEventIndicators", M::INDICATORS.len().to_string()));
+pub(super) fn document(xml: &mut Xml, profile: &Profile<'_>, table: &Table) -> io::Result<()> {
+    let mut attributes = root(Standard::Fmi2, profile, table, "guid");
+    if profile.model_exchange {
+        attributes.push(("numberOfEventIndicators", profile.indicators.len().to_string()));
     }
     xml.create_element("fmiModelDescription")
         .with_attributes(attributes.iter().map(|(name, value)| (*name, value.as_str())))
         .write_inner_content(|xml| {
-            interfaces::<M>(xml)?;
+            interfaces(xml, profile)?;
             units(xml, table)?;
             types(xml, table)?;
             log_categories(xml)?;
-            default_experiment::<M>(xml)?;
+            default_experiment(xml, profile)?;
             xml.create_element("ModelVariables").write_inner_content(|xml| {
                 table
                     .variables
@@ -42,21 +40,21 @@ pub(super) fn document<M: Model>(xml: &mut Xml, table: &Table) -> io::Result<()>
     Ok(())
 }
 
-fn interfaces<M: Model>(xml: &mut Xml) -> io::Result<()> {
-    let with = |more: &[&'static str]| {
-        let yes = [
-            "canNotUseMemoryManagementFunctions",
-            "canGetAndSetFMUstate",
-            "canSerializeFMUstate",
-            "providesDirectionalDerivative",
+fn interfaces(xml: &mut Xml, profile: &Profile<'_>) -> io::Result<()> {
+    let with = |steps: bool| {
+        let flags = [
+            ("canNotUseMemoryManagementFunctions", true),
+            ("canGetAndSetFMUstate", profile.serialised_states),
+            ("canSerializeFMUstate", profile.serialised_states),
+            ("providesDirectionalDerivative", profile.directional_derivatives),
+            ("canHandleVariableCommunicationStepSize", steps),
         ];
-        let flags = yes.iter().chain(more).map(|flag| (*flag, "true".to_string()));
-        [("modelIdentifier", M::NAME.to_string())].into_iter().chain(flags).collect::<Vec<_>>()
+        interface(profile, &flags)
     };
-    if M::MODEL_EXCHANGE {
-        leaf(xml, "ModelExchange", &with(&[]))?;
+    if profile.model_exchange {
+        leaf(xml, "ModelExchange", &with(false))?;
     }
-    leaf(xml, "CoSimulation", &with(&["canHandleVariableCommunicationStepSize"]))
+    leaf(xml, "CoSimulation", &with(true))
 }
 
 fn types(xml: &mut Xml, table: &Table) -> io::Result<()> {

@@ -2,25 +2,23 @@
 
 use std::io;
 
-use model::Model;
-
 use super::{
-    Unknowns, Xml, default_experiment, enumerations, identity, items, leaf, list, log_categories, root,
-    typed, units,
+    Unknowns, Xml, default_experiment, enumerations, identity, interface, items, leaf, list, log_categories,
+    root, typed, units,
 };
-use crate::Standard;
-use crate::table::{Layout, Part, Table, Variable};
+use crate::table::{Table, Variable};
+use crate::{Profile, Standard};
 
-pub(super) fn document<M: Model>(xml: &mut Xml, table: &Table) -> io::Result<()> {
-    let attributes = root::<M>(Standard::Fmi3, table, "instantiationToken");
+pub(super) fn document(xml: &mut Xml, profile: &Profile<'_>, table: &Table) -> io::Result<()> {
+    let attributes = root(Standard::Fmi3, profile, table, "instantiationToken");
     xml.create_element("fmiModelDescription")
         .with_attributes(attributes.iter().map(|(name, value)| (*name, value.as_str())))
         .write_inner_content(|xml| {
-            interfaces::<M>(xml)?;
+            interfaces(xml, profile)?;
             units(xml, table)?;
             types(xml, table)?;
             log_categories(xml)?;
-            default_experiment::<M>(xml)?;
+            default_experiment(xml, profile)?;
             xml.create_element("ModelVariables").write_inner_content(|xml| {
                 table
                     .variables
@@ -28,22 +26,28 @@ pub(super) fn document<M: Model>(xml: &mut Xml, table: &Table) -> io::Result<()>
                     .enumerate()
                     .try_for_each(|(i, v)| variable(xml, i, v, table.is_state(i)))
             })?;
-            xml.create_element("ModelStructure").write_inner_content(|xml| structure::<M>(xml, table))?;
+            xml.create_element("ModelStructure").write_inner_content(|xml| structure(xml, profile, table))?;
             Ok(())
         })?;
     Ok(())
 }
 
-fn interfaces<M: Model>(xml: &mut Xml) -> io::Result<()> {
-    let with = |more: &[&'static str]| {
-        let yes = ["canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"];
-        let flags = yes.iter().chain(more).map(|flag| (*flag, "true".to_string()));
-        [("modelIdentifier", M::NAME.to_string())].into_iter().chain(flags).collect::<Vec<_>>()
+fn interfaces(xml: &mut Xml, profile: &Profile<'_>) -> io::Result<()> {
+    let with = |steps: bool| {
+        let flags = [
+            ("canGetAndSetFMUState", profile.serialised_states),
+            ("canSerializeFMUState", profile.serialised_states),
+            ("providesDirectionalDerivatives", profile.directional_derivatives),
+            ("needsCompletedIntegratorStep", !steps),
+            ("canHandleVariableCommunicationStepSize", steps),
+            ("hasEventMode", steps),
+        ];
+        interface(profile, &flags)
     };
-    if M::MODEL_EXCHANGE {
-        leaf(xml, "ModelExchange", &with(&["needsCompletedIntegratorStep"]))?;
+    if profile.model_exchange {
+        leaf(xml, "ModelExchange", &with(false))?;
     }
-    leaf(xml, "CoSimulation", &with(&["canHandleVariableCommunicationStepSize", "hasEventMode"]))
+    leaf(xml, "CoSimulation", &with(true))
 }
 
 fn types(xml: &mut Xml, table: &Table) -> io::Result<()> {
@@ -66,7 +70,7 @@ fn variable(xml: &mut Xml, reference: usize, variable: &Variable, is_state: bool
 
 /// Outputs and derivatives with their exact direct dependencies; what is computed at the start as
 /// initial unknowns; event indicators.
-fn structure<M: Model>(xml: &mut Xml, table: &Table) -> io::Result<()> {
+fn structure(xml: &mut Xml, profile: &Profile<'_>, table: &Table) -> io::Result<()> {
     let Unknowns { outputs, derivatives, initial } = Unknowns::new(table);
     for (element, unknowns) in [("Output", outputs), ("ContinuousStateDerivative", derivatives)] {
         for unknown in unknowns {
@@ -74,7 +78,7 @@ fn structure<M: Model>(xml: &mut Xml, table: &Table) -> io::Result<()> {
             leaf(xml, element, &[("valueReference", unknown.to_string()), ("dependencies", knowns)])?;
         }
     }
-    let indicators = Layout::<M>::part(Part::Indicators).collect();
+    let indicators = profile.indicators.clone().collect();
     for (element, unknowns) in [("InitialUnknown", initial), ("EventIndicator", indicators)] {
         for unknown in unknowns {
             leaf(xml, element, &[("valueReference", unknown.to_string())])?;

@@ -10,10 +10,10 @@ use model::{Causality, EnumType, Initial, Kind, Model, Variability};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
 
-use crate::Standard;
 use crate::c_abi::LOG_CATEGORIES;
 use crate::table::{Table, Variable};
 use crate::unit::BaseUnit;
+use crate::{Profile, Standard};
 
 type Xml = Writer<Vec<u8>>;
 type Attributes = Vec<(&'static str, String)>;
@@ -23,12 +23,19 @@ type Attributes = Vec<(&'static str, String)>;
 /// # Errors
 /// A unit that is not known; otherwise none (writing goes to memory).
 pub fn model_description<M: Model>(standard: Standard) -> io::Result<Vec<u8>> {
-    let table = Table::new::<M>();
+    describe(&Profile::of::<M>(), &Table::new::<M>(), standard)
+}
+
+/// The model description from a profile and the variables.
+///
+/// # Errors
+/// As [`model_description`].
+pub fn describe(profile: &Profile<'_>, table: &Table, standard: Standard) -> io::Result<Vec<u8>> {
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
     match standard {
-        Standard::Fmi2 => fmi2::document::<M>(&mut xml, &table)?,
-        Standard::Fmi3 => fmi3::document::<M>(&mut xml, &table)?,
+        Standard::Fmi2 => fmi2::document(&mut xml, profile, table)?,
+        Standard::Fmi3 => fmi3::document(&mut xml, profile, table)?,
     }
     xml.write_event(Event::Text(BytesText::new("\n")))?;
     Ok(xml.into_inner())
@@ -48,12 +55,12 @@ pub(crate) fn number(value: f64) -> String {
 }
 
 /// Attributes of the root element; `token` is what the standard calls the instantiation token.
-fn root<M: Model>(standard: Standard, table: &Table, token: &'static str) -> Attributes {
+fn root(standard: Standard, profile: &Profile<'_>, table: &Table, token: &'static str) -> Attributes {
     vec![
         ("fmiVersion", standard.version().into()),
-        ("modelName", M::NAME.into()),
+        ("modelName", profile.name.into()),
         (token, table.token()),
-        ("description", M::DESCRIPTION.into()),
+        ("description", profile.description.into()),
         ("version", env!("CARGO_PKG_VERSION").into()),
         ("license", "MIT OR Apache-2.0".into()),
         ("generationTool", concat!("koppel ", env!("CARGO_PKG_VERSION")).into()),
@@ -86,6 +93,12 @@ fn units(xml: &mut Xml, table: &Table) -> io::Result<()> {
     Ok(())
 }
 
+/// The flags of an interface that are true, in the order of the standard.
+fn interface(profile: &Profile<'_>, flags: &[(&'static str, bool)]) -> Attributes {
+    let yes = flags.iter().filter(|(_, on)| *on).map(|(flag, _)| (*flag, "true".to_string()));
+    [("modelIdentifier", profile.name.to_string())].into_iter().chain(yes).collect()
+}
+
 /// The enumeration types in the order of their first variables.
 fn enumerations(table: &Table) -> Vec<&'static EnumType> {
     let mut types: Vec<&'static EnumType> = Vec::new();
@@ -102,11 +115,10 @@ fn enumerations(table: &Table) -> Vec<&'static EnumType> {
 /// Items of an enumeration with the numbers they have in the code.
 fn items(xml: &mut Xml, t: &EnumType) -> io::Result<()> {
     t.items.iter().try_for_each(|item| {
-        let attributes = [
-            ("name", item.name.to_string()),
-            ("value", item.value.to_string()),
-            ("description", item.description.into()),
-        ];
+        let mut attributes = vec![("name", item.name.to_string()), ("value", item.value.to_string())];
+        if !item.description.is_empty() {
+            attributes.push(("description", item.description.into()));
+        }
         leaf(xml, "Item", &attributes)
     })
 }
@@ -121,12 +133,11 @@ fn log_categories(xml: &mut Xml) -> io::Result<()> {
     Ok(())
 }
 
-fn default_experiment<M: Model>(xml: &mut Xml) -> io::Result<()> {
-    let experiment = M::EXPERIMENT;
+fn default_experiment(xml: &mut Xml, profile: &Profile<'_>) -> io::Result<()> {
     let attributes = [
-        ("startTime", "0".into()),
-        ("stopTime", number(experiment.stop)),
-        ("stepSize", number(experiment.step)),
+        ("startTime", number(profile.start)),
+        ("stopTime", number(profile.experiment.stop)),
+        ("stepSize", number(profile.experiment.step)),
     ];
     leaf(xml, "DefaultExperiment", &attributes)
 }

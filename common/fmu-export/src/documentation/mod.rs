@@ -10,13 +10,14 @@ mod variables;
 
 use std::fmt::Write as _;
 
-use model::{Causality, Documentation, Model};
+use model::{Causality, Documentation};
 use pulldown_cmark::{Event, HeadingLevel, Options, Parser, Tag, TagEnd, html};
 use quick_xml::escape::partial_escape;
 
+use crate::Profile;
 use crate::describe::number;
 use crate::reference::{self, FOLDER};
-use crate::table::{Layout, Table};
+use crate::table::Table;
 use samples::Samples;
 
 /// Everything that can be wrong with the documentation of a model.
@@ -72,25 +73,24 @@ const SECTIONS: [(&str, &str); 7] = [
     ("reference", "Reference run"),
 ];
 
-/// The page of the model `M`.
+/// The page of an FMU.
 ///
 /// # Errors
 /// [`DocumentationError`].
-pub(crate) fn page<M: Model>() -> Result<String, DocumentationError> {
-    let table = Table::new::<M>();
-    let samples = Samples::parse(M::DOCUMENTATION.reference)?;
+pub(crate) fn page(profile: &Profile<'_>, table: &Table) -> Result<String, DocumentationError> {
+    let samples = Samples::parse(profile.documentation.reference)?;
     let mut page = String::new();
-    head::<M>(&mut page);
+    head(&mut page, profile);
     for (anchor, title) in SECTIONS {
         add!(page, "<section id=\"{anchor}\">\n<h2>{title}</h2>\n");
         match anchor {
-            "model" => html::push_html(&mut page, write_up(M::DOCUMENTATION.text)),
-            "ports" => ports::section(&mut page, &table),
-            "parameters" => parameters::<M>(&mut page, &table),
-            "inputs" => variables::table(&mut page, &table, Causality::Input, |_| true),
-            "outputs" => variables::table(&mut page, &table, Causality::Output, |_| true),
-            "locals" => variables::table(&mut page, &table, Causality::Local, |_| true),
-            _ => reference_run::<M>(&mut page, &table, &samples)?,
+            "model" => html::push_html(&mut page, write_up(profile.documentation.text)),
+            "ports" => ports::section(&mut page, table),
+            "parameters" => parameters(&mut page, profile, table),
+            "inputs" => variables::table(&mut page, table, Causality::Input, |_| true),
+            "outputs" => variables::table(&mut page, table, Causality::Output, |_| true),
+            "locals" => variables::table(&mut page, table, Causality::Local, |_| true),
+            _ => reference_run(&mut page, profile, table, &samples)?,
         }
         page.push_str("</section>\n");
     }
@@ -116,12 +116,12 @@ fn write_up(markdown: &str) -> impl Iterator<Item = Event<'_>> {
 }
 
 /// Head of the page, title and list of contents.
-fn head<M: Model>(page: &mut String) {
-    let (name, description) = (M::NAME, text(M::DESCRIPTION));
+fn head(page: &mut String, profile: &Profile<'_>) {
+    let (name, description) = (profile.name, text(profile.description));
     add!(page, "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\" />\n");
     add!(page, "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\" />\n");
     add!(page, "<title>{name}: {description}</title>\n<style>\n{}</style>\n", include_str!("style.css"));
-    add!(page, "</head>\n<body>\n<main>\n<header>\n{}", M::DOCUMENTATION.icon_svg);
+    add!(page, "</head>\n<body>\n<main>\n<header>\n{}", profile.documentation.icon_svg);
     add!(page, "<h1>{name}</h1>\n<p>{description}</p>\n</header>\n<nav>\n<ul>\n");
     for (anchor, title) in SECTIONS {
         add!(page, "<li><a href=\"#{anchor}\">{title}</a></li>\n");
@@ -130,8 +130,8 @@ fn head<M: Model>(page: &mut String) {
 }
 
 /// Parameters of the model, then those that every FMU has.
-fn parameters<M: Model>(page: &mut String, table: &Table) {
-    let own = |i| Layout::<M>::PARAMETERS.contains(&i);
+fn parameters(page: &mut String, profile: &Profile<'_>, table: &Table) {
+    let own = |i| profile.parameters.contains(&i);
     page.push_str("<p>No parameter is required. A value outside its range is refused when it is set.</p>\n");
     variables::table(page, table, Causality::Parameter, own);
     page.push_str(concat!(
@@ -143,21 +143,22 @@ fn parameters<M: Model>(page: &mut String, table: &Table) {
 }
 
 /// Diagrams and files of the reference run.
-fn reference_run<M: Model>(
+fn reference_run(
     page: &mut String,
+    profile: &Profile<'_>,
     table: &Table,
     samples: &Samples<'_>,
 ) -> Result<(), DocumentationError> {
-    let Documentation { plots, reference_inputs, .. } = M::DOCUMENTATION;
-    add!(page, "<p>{}</p>\n<ul>\n", text(&reference::description::<M>()));
+    let Documentation { plots, reference_inputs, .. } = profile.documentation;
+    add!(page, "<p>{}</p>\n<ul>\n", text(&reference::description(profile)));
     let file = |page: &mut String, name: String, what: &str| {
         add!(page, "<li><a href=\"../{FOLDER}/{name}\">{name}</a>: {what}</li>\n");
     };
-    file(page, reference::results_name::<M>(), "outputs");
+    file(page, reference::results_name(profile), "outputs");
     if reference_inputs.is_some() {
-        file(page, reference::inputs_name::<M>(), "inputs");
+        file(page, reference::inputs_name(profile), "inputs");
     }
-    let stop = number(M::EXPERIMENT.stop);
-    add!(page, "</ul>\n<p>Time runs from 0 to {stop} s.</p>\n");
+    let (start, stop) = (number(profile.start), number(profile.experiment.stop));
+    add!(page, "</ul>\n<p>Time runs from {start} to {stop} s.</p>\n");
     plots.iter().try_for_each(|shown| plot::figure(page, shown, table, samples))
 }

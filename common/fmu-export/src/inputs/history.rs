@@ -7,7 +7,7 @@ const SAMPLES: usize = 3;
 
 /// The last samples of all inputs.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct History {
+pub struct History {
     /// Times, newest first
     pub(super) t: [f64; SAMPLES],
     /// Values, newest sample first
@@ -19,45 +19,48 @@ pub(crate) struct History {
 
 impl History {
     /// No samples of `count` inputs.
-    pub(crate) fn new(count: usize) -> Self {
+    #[must_use]
+    pub fn new(count: usize) -> Self {
         Self { t: [0.0; SAMPLES], u: vec![0.0; SAMPLES * count], len: 0, same: 0 }
     }
 
     /// True if it may be a history of `count` inputs.
-    pub(crate) fn fits(&self, count: usize) -> bool {
+    #[must_use]
+    pub fn fits(&self, count: usize) -> bool {
         self.u.len() == SAMPLES * count && self.len <= SAMPLES && self.same <= self.len
     }
 
     /// Overwrite with another history, without allocation.
-    pub(crate) fn copy_from(&mut self, other: &Self) {
+    pub fn copy_from(&mut self, other: &Self) {
         self.u.clone_from(&other.u);
         (self.t, self.len, self.same) = (other.t, other.len, other.same);
     }
 
     /// The inputs, or their treatment, are no longer those of the samples.
-    pub(crate) fn unsettle(&mut self) {
+    pub fn unsettle(&mut self) {
         self.same = 0;
     }
 
     /// True if all samples are the inputs as set, so that no polynomial moves.
-    pub(crate) fn settled(&self) -> bool {
+    #[must_use]
+    pub fn settled(&self) -> bool {
         self.same == SAMPLES
     }
 
     /// Forget all samples.
-    pub(crate) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         (self.len, self.same) = (0, 0);
     }
 
     /// Add a sample at `t` of the inputs as set, which are [settled](Self::settled).
-    pub(crate) fn push_again(&mut self, t: f64) {
+    pub fn push_again(&mut self, t: f64) {
         if t > self.t[0] {
             self.t = [t, self.t[0], self.t[1]];
         }
     }
 
     /// Add the values `u` at `t`; samples that are not older are replaced.
-    pub(crate) fn push(&mut self, t: f64, u: &[f64]) {
+    pub fn push(&mut self, t: f64, u: &[f64]) {
         let n = u.len();
         let newer = self.newer(t);
         let kept = (self.len - newer).min(SAMPLES - 1);

@@ -11,14 +11,16 @@ const INTEGRATED: usize = DEGREE + 2;
 
 /// A step for which polynomials are wanted.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Span {
-    pub(crate) from: f64,
-    pub(crate) to: f64,
+pub struct Span {
+    /// Its start [s]
+    pub from: f64,
+    /// Its end [s]
+    pub to: f64,
 }
 
 /// The course of all inputs over one step; only those that move are listed.
 #[derive(Debug, Clone)]
-pub(crate) struct Polynomials {
+pub struct Polynomials {
     from: f64,
     nodes: [f64; DEGREE],
     /// Divided differences
@@ -29,7 +31,8 @@ pub(crate) struct Polynomials {
 
 impl Polynomials {
     /// Room for `channels`.
-    pub(crate) fn new(channels: &Channels) -> Self {
+    #[must_use]
+    pub fn new(channels: &Channels) -> Self {
         Self {
             from: 0.0,
             nodes: [0.0; DEGREE],
@@ -39,13 +42,14 @@ impl Polynomials {
     }
 
     /// True if every input keeps its value.
-    pub(crate) fn constant(&self) -> bool {
+    #[must_use]
+    pub fn constant(&self) -> bool {
         self.newton.is_empty() && self.powers.is_empty()
     }
 
     /// Write the moving inputs at `t`; for dual numbers `t + 1 eps` with their rates.
     #[inline]
-    pub(crate) fn evaluate<S: Scalar>(&self, t: S, u: &mut [S]) {
+    pub fn evaluate<S: Scalar>(&self, t: S, u: &mut [S]) {
         let [d_0, d_1, d_2] = self.nodes.map(|node| t - node);
         for (i, [f_0, f_01, f_012, f_0123]) in &self.newton {
             u[*i] = d_0 * (d_1 * (d_2 * *f_0123 + *f_012) + *f_01) + *f_0;
@@ -57,7 +61,7 @@ impl Polynomials {
     }
 
     /// The course over `span`: `u` are the inputs as set, `forget` leaves the history out.
-    pub(crate) fn plan(
+    pub fn plan(
         &mut self,
         channels: &Channels,
         history: &History,

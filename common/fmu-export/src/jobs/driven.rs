@@ -2,8 +2,8 @@
 
 use std::cell::RefCell;
 
-use integrators::{Indicators, Jacobian, Ode, Solver};
-use model::{EvaluationError, Matrix, Model, System, Variables, state_jacobian};
+use integrators::{Indicators, Jacobian, Method, Ode, Solver};
+use model::{EvaluationError, Matrix, Model, Pace, System, Variables, state_jacobian};
 use num_dual::Dual64;
 
 use super::due;
@@ -102,6 +102,18 @@ impl<const N: usize, const Z: usize, Y: System<N, Z>> Indicators<N, Z> for Drive
 }
 
 impl<const N: usize, const Z: usize, Y: System<N, Z>> Driven<'_, N, Z, Y> {
+    /// Take the method that suits the equations at `t`; the time after which to ask again.
+    pub(super) fn choose_method(&self, t: f64, x: &[f64; N], solver: &mut Solver) -> f64 {
+        inputs_at!(self, t, u);
+        let Pace { stiff, span } = self.system.pace(t, x, u, &self.d);
+        let method = if stiff { Method::Radau5 } else { Method::Dop853 };
+        if method != solver.settings().method {
+            *solver = solver.with_method(method);
+            solver.reset();
+        }
+        span
+    }
+
     /// Carry out the time events that are due at `t`.
     pub(super) fn pass_events(&mut self, t: f64, x: &mut [f64; N], solver: &mut Solver) {
         for _ in 0..MAX_UPDATES {

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use integrators::{
-    Complex, MAX_EVALUATIONS, Method, Reached, Solver, Statistics, StepError, largest_stable_step, violates,
+    Complex, MAX_EVALUATIONS, Reached, Solver, Statistics, StepError, largest_stable_step, violates,
 };
 use model::{Model, Spectrum, System, Variables, Visitor, state_jacobian};
 use num_dual::Dual64;
@@ -12,6 +12,7 @@ use super::driven::{Course, Driven, inputs_at};
 use super::linear::{LinearCache, advance};
 use super::{due, not_finite};
 use crate::Fault;
+use crate::solver::{SolverMethod, method_name};
 
 /// One communication step with everything that happens inside it; nothing changes on failure.
 pub(crate) struct Step<'a, M: Model> {
@@ -24,6 +25,8 @@ pub(crate) struct Step<'a, M: Model> {
     pub(crate) course: Option<Course<'a>>,
     /// Leave events at the end of the step to Event Mode
     pub(crate) leave_events: bool,
+    /// The method follows the stiffness of the equations
+    pub(crate) auto: bool,
     /// Look at the eigenvalues first (fixed-step explicit methods)
     pub(crate) guard: bool,
     pub(crate) duals: &'a mut [Dual64],
@@ -76,7 +79,13 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
             if t >= to {
                 break;
             }
-            let target = system.next_event(&driven.d).filter(|event| *event < to).unwrap_or(to);
+            let mut target = system.next_event(&driven.d).filter(|event| *event < to).unwrap_or(to);
+            if self.auto {
+                let span = driven.choose_method(t, &x, &mut solver);
+                if span < 0.75 * (target - t) {
+                    target = t + span;
+                }
+            }
             if Z == 0 {
                 let whole = t.to_bits() == from.to_bits() && target.to_bits() == to.to_bits();
                 let span = (t, target, if whole { self.interval } else { target - t });
@@ -117,18 +126,9 @@ fn stable(solver: &Solver, (from, to): (f64, f64), eigenvalues: &[Complex]) -> R
     else {
         return Ok(());
     };
-    let method_name = match method {
-        Method::Heun => "heun",
-        Method::Rk4 => "rk4",
-        Method::Dopri5 => "dopri5",
-        Method::Dop853 => "dop853",
-        Method::Rodas4 => "rodas4",
-        Method::Radau5 => "radau5",
-        Method::Exact => "exact",
-    };
     Err(Fault::Unstable {
         t: from,
-        method: method_name,
+        method: method_name(SolverMethod::from(method) as i64),
         h,
         re: worst.re,
         im: worst.im,

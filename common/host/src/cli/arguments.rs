@@ -33,7 +33,7 @@ pub(super) enum Command {
     Study(Study),
     /// Run a scene over a grid of parameters
     Sweep(Sweep),
-    /// Pack a scene's folder with its FMUs into an .ssp archive
+    /// Pack a scene's folder with its FMUs into an .ssp archive, or into one FMU
     Pack(Pack),
 }
 
@@ -174,6 +174,15 @@ pub(super) struct Sweep {
 pub(super) struct Pack {
     /// The scene's folder
     pub(super) folder: PathBuf,
+    /// One Co-Simulation FMU with method common inside, instead of an .ssp archive
+    #[arg(long)]
+    pub(super) assembly: bool,
+    /// Version of FMI of the assembly
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u8).range(2..=3), requires = "assembly")]
+    pub(super) fmi: u8,
+    /// The shared library of assemblies
+    #[arg(long, default_value = "dist/lib/libassembly.so", requires = "assembly")]
+    pub(super) library: PathBuf,
     /// The archive
     #[arg(long, short)]
     pub(super) output: PathBuf,

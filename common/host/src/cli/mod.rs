@@ -43,6 +43,8 @@ enum CommandError {
     Write { path: PathBuf, source: io::Error },
     #[error("{failed} of {runs} runs failed; {path} says why")]
     Sweep { failed: usize, runs: usize, path: PathBuf },
+    #[error(transparent)]
+    Assembly(Box<crate::assembly::AssemblyError>),
     #[error("--set {0:?}: component.variable=value is needed")]
     Assignment(String),
 }
@@ -68,7 +70,7 @@ impl CommandError {
                 Error::Run(_) => 3,
             },
             Self::Write { .. } => 1,
-            Self::Read { .. } | Self::Plan { .. } | Self::Assignment(_) => 2,
+            Self::Assembly(_) | Self::Read { .. } | Self::Plan { .. } | Self::Assignment(_) => 2,
             Self::Sweep { .. } | Self::Study(_) => 3,
         }
     }

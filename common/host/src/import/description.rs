@@ -45,6 +45,37 @@ pub enum Causality {
     Local,
 }
 
+/// An enumeration type.
+#[derive(Clone, Debug)]
+pub struct Enumeration {
+    /// Meaning
+    pub text: String,
+    /// Its items
+    pub items: Vec<Item>,
+}
+
+/// An item of an enumeration.
+#[derive(Clone, Debug)]
+pub struct Item {
+    /// Name
+    pub name: String,
+    /// Number
+    pub value: i64,
+    /// Meaning
+    pub text: String,
+}
+
+/// What the start value of a computed variable means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Initial {
+    /// Given and kept
+    Exact,
+    /// Given as a guess
+    Approx,
+    /// Computed, or not said
+    Calculated,
+}
+
 /// A scalar variable.
 #[derive(Clone, Debug)]
 pub struct Variable {
@@ -64,8 +95,16 @@ pub struct Variable {
     pub unit: Option<String>,
     /// Name of its type
     pub declared_type: Option<String>,
+    /// Meaning
+    pub text: String,
     /// Start value as written
     pub start: Option<String>,
+    /// What the start value of a computed variable means
+    pub initial: Initial,
+    /// Smallest allowed value
+    pub min: Option<f64>,
+    /// Largest allowed value
+    pub max: Option<f64>,
     /// Typical magnitude
     pub nominal: f64,
     /// An array
@@ -80,6 +119,8 @@ pub struct Capabilities {
     pub identifier: String,
     /// States can be saved and restored
     pub state_saving: bool,
+    /// Saved states can be turned into bytes
+    pub serialised_states: bool,
     /// Directional derivatives
     pub directional_derivatives: bool,
     /// Event Mode in Co-Simulation
@@ -128,8 +169,8 @@ pub struct Description {
     pub model_exchange: Option<Capabilities>,
     /// All variables, in their order
     pub variables: Vec<Variable>,
-    /// Items of enumerations by the name of the type
-    pub enumerations: HashMap<String, Vec<(String, i64)>>,
+    /// Enumerations by the name of the type
+    pub enumerations: HashMap<String, Enumeration>,
     /// Units by name
     pub units: HashMap<String, BaseUnit>,
     /// References of the inputs and states that an output depends on; `None`: on all
@@ -331,14 +372,16 @@ fn capabilities(
     let Some(e) = root.child(name) else {
         return Ok(None);
     };
-    let (save, derivatives, skips_completed) = match version {
+    let (save, serialise, derivatives, skips_completed) = match version {
         Version::V2 => (
             "canGetAndSetFMUstate",
+            "canSerializeFMUstate",
             "providesDirectionalDerivative",
             is_true(e, "completedIntegratorStepNotNeeded"),
         ),
         Version::V3 => (
             "canGetAndSetFMUState",
+            "canSerializeFMUState",
             "providesDirectionalDerivatives",
             !is_true(e, "needsCompletedIntegratorStep"),
         ),
@@ -346,6 +389,7 @@ fn capabilities(
     Ok(Some(Capabilities {
         identifier: required(e, "modelIdentifier")?.into(),
         state_saving: is_true(e, save),
+        serialised_states: is_true(e, serialise),
         directional_derivatives: is_true(e, derivatives),
         event_mode: version == Version::V3 && is_true(e, "hasEventMode"),
         completed_steps: !skips_completed,
@@ -423,14 +467,23 @@ fn variable(
         discrete: element.attribute("variability") == Some("discrete"),
         tunable: element.attribute("variability") == Some("tunable"),
         unit: typed.attribute("unit").map(String::from).or(of_type.0),
+        text: element.attribute("description").unwrap_or_default().into(),
         start: start.map(String::from),
+        initial: match element.attribute("initial") {
+            Some("exact") => Initial::Exact,
+            Some("approx") => Initial::Approx,
+            _ => Initial::Calculated,
+        },
+        min: optional(typed, "min")?,
+        max: optional(typed, "max")?,
         nominal: optional(typed, "nominal")?.or(of_type.1).unwrap_or(1.0),
         array: typed.child("Dimension").is_some(),
         declared_type,
     })
 }
 
-fn enumerations(root: &Element) -> Result<HashMap<String, Vec<(String, i64)>>, DescriptionError> {
+fn enumerations(root: &Element) -> Result<HashMap<String, Enumeration>, DescriptionError> {
+    let text = |e: &Element| e.attribute("description").unwrap_or_default().to_owned();
     let mut types = HashMap::new();
     for element in root.inside("TypeDefinitions") {
         let typed = element.child("Enumeration").unwrap_or(element);
@@ -439,9 +492,11 @@ fn enumerations(root: &Element) -> Result<HashMap<String, Vec<(String, i64)>>, D
         }
         let items = typed.all("Item").map(|item| {
             let value = optional(item, "value")?.ok_or_else(|| missing(item, "value"))?;
-            Ok((required(item, "name")?.to_owned(), value))
+            Ok(Item { name: required(item, "name")?.to_owned(), value, text: text(item) })
         });
-        types.insert(required(element, "name")?.to_owned(), items.collect::<Result<_, DescriptionError>>()?);
+        let items = items.collect::<Result<_, DescriptionError>>()?;
+        let name = required(element, "name")?.to_owned();
+        types.insert(name, Enumeration { text: text(element), items });
     }
     Ok(types)
 }

@@ -333,6 +333,29 @@ impl Instance {
         }
     }
 
+    /// The present state as bytes, for another instance of the same FMU too.
+    pub fn save_bytes(&mut self) -> Result<Vec<u8>, Fault> {
+        self.counts.save += 1;
+        both!(self, i => {
+            let mut saved = None;
+            i.save(&mut saved)?;
+            let bytes = saved.as_ref().map_or(Ok(Vec::new()), |saved| i.serialise(saved));
+            saved.map_or(Ok(()), |saved| i.forget(saved))?;
+            bytes
+        })
+    }
+
+    /// Goes back to a state from bytes.
+    pub fn restore_bytes(&mut self, bytes: &[u8]) -> Result<(), Fault> {
+        self.counts.restore += 1;
+        both!(self, i => {
+            let saved = i.deserialise(bytes)?;
+            let result = i.restore(&saved);
+            i.forget(saved)?;
+            result
+        })
+    }
+
     /// `d unknowns / d knowns` times `seed`.
     pub fn directional(
         &mut self,

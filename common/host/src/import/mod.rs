@@ -8,7 +8,8 @@ mod instance;
 pub use archive::{Archive, ArchiveError};
 pub use binding::{Fault, LibraryError, Status, Stepped, Update};
 pub use description::{
-    Capabilities, Causality, Description, DescriptionError, Experiment, Variable, VariableKind, Version,
+    Capabilities, Causality, Description, DescriptionError, Enumeration, Experiment, Initial, Item, Variable,
+    VariableKind, Version,
 };
 pub use instance::{Counts, Instance, Interface, Saved};
 
@@ -116,18 +117,41 @@ pub struct Fmu {
 }
 
 struct Unpacked {
-    folder: TempDir,
+    folder: Folder,
     library: Library,
     identifier: String,
 }
 
+/// Where an FMU is unpacked.
+enum Folder {
+    /// By this host, until it is closed
+    Own(TempDir),
+    /// By others
+    Given(PathBuf),
+}
+
+impl Folder {
+    fn path(&self) -> &Path {
+        match self {
+            Self::Own(folder) => folder.path(),
+            Self::Given(folder) => folder,
+        }
+    }
+}
+
 impl Fmu {
-    /// Reads the model description of an archive.
+    /// Reads the model description of an archive, or of a folder with the content of one.
     ///
     /// # Errors
     /// A file that is no FMU.
     pub fn open(path: &Path) -> Result<Rc<Self>, ImportError> {
-        let text = Archive::open(path)?.read("modelDescription.xml")?;
+        const DESCRIPTION: &str = "modelDescription.xml";
+        let text = if path.is_dir() {
+            let file = path.join(DESCRIPTION);
+            std::fs::read(&file).map_err(|source| ArchiveError::Io { path: file, source })?
+        } else {
+            Archive::open(path)?.read(DESCRIPTION)?
+        };
         let description = Description::read(&text)
             .map_err(|source| ImportError::Description { path: path.into(), source })?;
         Ok(Rc::new(Self { path: path.into(), description, unpacked: OnceCell::new() }))
@@ -192,13 +216,19 @@ impl Fmu {
         };
         let binaries = format!("binaries/{platform}/");
         let entry = format!("{binaries}{identifier}.{EXTENSION}");
-        let mut archive = Archive::open(&self.path)?;
-        if !archive.has(&entry) {
+        let folder = if self.path.is_dir() {
+            Folder::Given(self.path.clone())
+        } else {
+            let mut archive = Archive::open(&self.path)?;
+            let folder = tempfile::Builder::new().prefix("koppel-").tempdir().map_err(ImportError::Folder)?;
+            archive.unpack(folder.path(), |name| {
+                name.starts_with(&binaries) || name.starts_with("resources/")
+            })?;
+            Folder::Own(folder)
+        };
+        if !folder.path().join(&entry).is_file() {
             return Err(ImportError::Platform { path: self.path.clone(), entry });
         }
-        let folder = tempfile::Builder::new().prefix("koppel-").tempdir().map_err(ImportError::Folder)?;
-        archive
-            .unpack(folder.path(), |name| name.starts_with(&binaries) || name.starts_with("resources/"))?;
         let library = Library::load(&folder.path().join(&entry), version)?;
         Ok(Unpacked { folder, library, identifier: identifier.into() })
     }

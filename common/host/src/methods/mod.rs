@@ -7,6 +7,7 @@ mod exchange;
 mod inputs;
 mod settings;
 
+pub(crate) use common::{Run, RunState};
 pub use settings::{Choices, Config, MethodKind, integrator_name};
 
 use std::time::Instant;

@@ -56,19 +56,20 @@ fn boolean(value: &ParameterValue) -> Option<bool> {
 /// An enumeration by item name, or by its number.
 fn item(node: &Node, variable: &Variable, value: &ParameterValue, name: &str) -> Result<Value, SceneError> {
     let types = &node.fmu.description.enumerations;
-    let items = variable.declared_type.as_ref().and_then(|t| types.get(t)).map_or(&[][..], |items| items);
+    let known = variable.declared_type.as_ref().and_then(|t| types.get(t));
+    let items = known.map_or(&[][..], |known| &known.items);
     let found = match value {
-        ParameterValue::Integer(number) => items.iter().find(|(_, v)| v == number),
+        ParameterValue::Integer(number) => items.iter().find(|item| item.value == *number),
         ParameterValue::Item(text) | ParameterValue::String(text) | ParameterValue::Text(text) => {
             let number = text.parse::<i64>().ok();
-            items.iter().find(|(item, v)| item == text || Some(*v) == number)
+            items.iter().find(|item| item.name == *text || Some(item.value) == number)
         }
         _ => None,
     };
-    found.map(|(_, v)| Value::Integer(*v)).ok_or_else(|| SceneError::Item {
+    found.map(|item| Value::Integer(item.value)).ok_or_else(|| SceneError::Item {
         parameter: name.into(),
         item: shown(value),
-        items: items.iter().map(|(item, _)| item.as_str()).collect::<Vec<_>>().join(", "),
+        items: items.iter().map(|item| item.name.as_str()).collect::<Vec<_>>().join(", "),
     })
 }
 

@@ -4,7 +4,7 @@ mod pack;
 mod package;
 mod read;
 
-pub use pack::pack;
+pub use pack::{files, pack};
 pub use package::{Package, outside_reference};
 pub use read::SspError;
 

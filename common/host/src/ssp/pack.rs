@@ -18,7 +18,7 @@ pub fn pack(folder: &Path, fmus: &Path, references: &Path, output: &Path) -> Res
     let package = Package::open(folder)?;
     let system = package.system()?;
     let mut files = BTreeMap::new();
-    collect(folder, "", &mut files)?;
+    self::files(folder, "", &mut files)?;
     for component in &system.components {
         let fmu = package.fmu(&component.source, fmus)?;
         files.insert(component.source.clone(), fmu.path().to_owned());
@@ -43,17 +43,20 @@ pub fn pack(folder: &Path, fmus: &Path, references: &Path, output: &Path) -> Res
     Ok(files.into_keys().collect())
 }
 
-/// Files below a folder by their names in the archive; links are left out.
-fn collect(folder: &Path, prefix: &str, files: &mut BTreeMap<String, PathBuf>) -> Result<(), SspError> {
+/// Files below a folder by their names in the archive, `prefix` first; links are left out.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn files(folder: &Path, prefix: &str, found: &mut BTreeMap<String, PathBuf>) -> Result<(), SspError> {
     let failed = |source| SspError::Io { path: folder.into(), source };
     for entry in fs::read_dir(folder).map_err(failed)? {
         let entry = entry.map_err(failed)?;
         let kind = entry.file_type().map_err(failed)?;
         let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
         if kind.is_dir() {
-            collect(&entry.path(), &format!("{name}/"), files)?;
+            self::files(&entry.path(), &format!("{name}/"), found)?;
         } else if kind.is_file() {
-            files.insert(name, entry.path());
+            found.insert(name, entry.path());
         }
     }
     Ok(())

@@ -63,6 +63,14 @@ impl Package {
         self.structure = structure.into();
     }
 
+    /// The root structure as it is written.
+    ///
+    /// # Errors
+    /// A missing structure.
+    pub fn structure(&self) -> Result<Vec<u8>, SspError> {
+        self.read(&self.structure)
+    }
+
     /// Reads the system structure.
     ///
     /// # Errors
@@ -128,7 +136,8 @@ impl Package {
                 }
             }
         }
-        if outside.is_file() {
+        // a folder is an unpacked FMU
+        if outside.exists() {
             return Ok(outside);
         }
         Err(SspError::NoFmu { source_name: source.into(), scene: self.path.clone(), folder: fallback.into() })

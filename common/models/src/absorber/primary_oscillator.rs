@@ -8,7 +8,7 @@ use model::{
 use serde::{Deserialize, Serialize};
 
 use super::primary_variables::{Dynamics, Energy, Inertia, Inputs, Motion, Parameters, PortKind};
-use crate::port::slots;
+use crate::port::{along, slots};
 
 /// Smallest mass with everything on it that can be accelerated [kg]
 const SMALLEST_MASS: f64 = f64::MIN_POSITIVE;
@@ -68,7 +68,7 @@ impl PrimaryOscillator {
 
     /// The part of a vector along e, and across it.
     fn along<S: Scalar>(&self, v: &Vector3<S>) -> S {
-        v.x * self.e.x + v.y * self.e.y + v.z * self.e.z
+        along(&self.e, v)
     }
 
     fn across<S: Scalar>(&self, v: &Vector3<S>) -> Vector3<S> {

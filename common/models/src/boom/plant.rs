@@ -120,8 +120,7 @@ impl Model for Boom {
     const METHODS: &'static [i64] = &[2, 3];
     const METHOD: i64 = 3;
     const STEP: f64 = 0.05;
-    const RTOL: f64 = 1e-8;
-    const ATOL: f64 = 1e-10;
+    const TOLERANCES: [f64; 2] = [1e-8, 1e-10];
     type Parameters = Parameters;
     type Inputs<S: model::Scalar> = Inputs<S>;
     type Motion<S: model::Scalar> = Motion<S>;

@@ -50,6 +50,7 @@ impl Functions {
         &self,
         interface: Interface,
         token: &CStr,
+        resources: *const c_char,
         log: &Log,
     ) -> (Instance, Box<Callbacks>) {
         let callbacks = Box::new(Callbacks {
@@ -62,15 +63,7 @@ impl Functions {
         let kind = c_int::from(interface == Interface::CoSimulation2);
         // SAFETY: the strings live; log and callbacks are dropped after the instance is freed, and stay where they are.
         let instance = unsafe {
-            (self.instantiate)(
-                c"fuzz".as_ptr(),
-                kind,
-                token.as_ptr(),
-                ptr::null(),
-                &raw const *callbacks,
-                0,
-                1,
-            )
+            (self.instantiate)(c"fuzz".as_ptr(), kind, token.as_ptr(), resources, &raw const *callbacks, 0, 1)
         };
         (instance, callbacks)
     }

@@ -1,6 +1,6 @@
 //! Functions of FMI 3.0 that have other signatures in FMI 2.0, or none.
 
-use std::ffi::CStr;
+use std::ffi::{CStr, c_char};
 use std::ptr;
 
 use fmi_capi::fmi3::{self, Flag, Instance};
@@ -40,16 +40,22 @@ library_functions! {
 }
 
 impl Functions {
-    pub(super) fn instantiate(&self, interface: Interface, token: &CStr, log: &Log) -> Instance {
+    pub(super) fn instantiate(
+        &self,
+        interface: Interface,
+        token: &CStr,
+        resources: *const c_char,
+        log: &Log,
+    ) -> Instance {
         let environment = ptr::from_ref::<Log>(log).cast_mut().cast();
-        let (name, none) = (c"fuzz".as_ptr(), ptr::null());
+        let name = c"fuzz".as_ptr();
         // SAFETY: the strings live; the log is dropped after the instance is freed, and stays where it is.
         unsafe {
             if interface == Interface::ModelExchange {
                 (self.instantiate_model_exchange)(
                     name,
                     token.as_ptr(),
-                    none,
+                    resources,
                     0,
                     1,
                     environment,
@@ -60,7 +66,7 @@ impl Functions {
                 (self.instantiate_co_simulation)(
                     name,
                     token.as_ptr(),
-                    none,
+                    resources,
                     0,
                     1,
                     events,

@@ -275,6 +275,22 @@ impl Instance {
         call!(self.fmi2FreeFMUstate(&raw mut state))
     }
 
+    /// A saved state as bytes.
+    pub(crate) fn serialise(&self, saved: &Saved) -> Result<Vec<u8>, Fault> {
+        let mut size = 0;
+        call!(self.fmi2SerializedFMUstateSize(saved.0, &raw mut size))?;
+        let mut bytes = vec![0_u8; size];
+        call!(self.fmi2SerializeFMUstate(saved.0, bytes.as_mut_ptr().cast(), size))?;
+        Ok(bytes)
+    }
+
+    /// A saved state from bytes.
+    pub(crate) fn deserialise(&self, bytes: &[u8]) -> Result<Saved, Fault> {
+        let mut state = ptr::null_mut();
+        call!(self.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &raw mut state))?;
+        Ok(Saved(state))
+    }
+
     pub(crate) fn directional(
         &self,
         unknowns: &[u32],

@@ -309,6 +309,22 @@ impl Instance {
         call!(self.fmi3FreeFMUState(&raw mut state))
     }
 
+    /// A saved state as bytes.
+    pub(crate) fn serialise(&self, saved: &Saved) -> Result<Vec<u8>, Fault> {
+        let mut size = 0;
+        call!(self.fmi3SerializedFMUStateSize(saved.0, &raw mut size))?;
+        let mut bytes = vec![0; size];
+        call!(self.fmi3SerializeFMUState(saved.0, bytes.as_mut_ptr(), size))?;
+        Ok(bytes)
+    }
+
+    /// A saved state from bytes.
+    pub(crate) fn deserialise(&self, bytes: &[u8]) -> Result<Saved, Fault> {
+        let mut state = ptr::null_mut();
+        call!(self.fmi3DeserializeFMUState(bytes.as_ptr(), bytes.len(), &raw mut state))?;
+        Ok(Saved(state))
+    }
+
     pub(crate) fn directional(
         &self,
         unknowns: &[u32],
