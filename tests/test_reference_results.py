@@ -232,6 +232,28 @@ def test_rvdp_absorber(packed):
     assert compare(result, expected, 1e-9) == []
 
 
+def test_boom(packed):
+    """The profile of an independent program (its commands are those of the reference run). Where they change it shows the
+    rates under the new ones, our file those of the step that ends."""
+    result = packed("boom")
+    path = paths.ROOT / "tests" / "reference" / "boom" / "profile_rate_A.csv"
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    table = np.genfromtxt(lines, delimiter=",", names=True, deletechars="")
+    keep = ~np.isin(result.t, (60.0, 120.0))
+    assert (result.t == table["time"]).all()
+    kept = Result(result.t[keep], result.names, result.values[keep], result.nominal, {})
+    expected = {f"joint[{i}].angle": table[f"q{i}"] for i in range(1, 7)}
+    expected |= {f"joint[{i}].velocity": table[f"qd{i}"] for i in range(1, 7)}
+    expected |= {f"cylinder[{i}].flow": table[f"flow{i}"] for i in range(2, 7)}
+    expected |= {f"distance.arm[{i}]": table[f"dist{i}"] for i in range(2, 7)}
+    expected |= {f"TIP.{of}.{axis}": table[f"tip.{of}.{axis}"] for of in "rva" for axis in "xyz"}
+    expected |= {"slew.flow": table["flow1"], "hydraulics.flow_total": table["flow_total"]}
+    expected |= {"stability.beta_min": table["beta_min"], "energy.potential": table["potential"]}
+    compare(kept, {name: column[keep] for name, column in expected.items()}, 1e-9)
+    gained = result["energy.potential"] - result["energy.potential"][0]
+    assert np.abs(gained - result["energy.supplied"]).max() <= 1e-9 * np.abs(gained).max()
+
+
 # a run at default settings ----------------------------------------------------------------------------------------
 @pytest.mark.parametrize("name", NAMES)
 def test_run_at_default_settings(fmu, packed, name):

@@ -103,8 +103,12 @@ static WITHOUT_AUTO: EnumType = {
 pub(crate) fn defaults<M: Model>(solver: &mut [Variable]) {
     let [rtol, atol] = M::TOLERANCES;
     #[allow(clippy::cast_precision_loss, reason = "a small number")]
-    let starts =
-        [("solver.method", M::METHOD as f64), ("solver.step", M::STEP), ("solver.rtol", rtol), ("solver.atol", atol)];
+    let starts = [
+        ("solver.method", M::METHOD as f64),
+        ("solver.step", M::STEP),
+        ("solver.rtol", rtol),
+        ("solver.atol", atol),
+    ];
     for Variable { name, entry, .. } in solver {
         if let Some((_, start)) = starts.iter().find(|(n, _)| n == name) {
             entry.start = *start;

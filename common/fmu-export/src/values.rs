@@ -57,8 +57,13 @@ impl<M: Model> Instance<M> {
         is: impl Fn(Kind) -> bool,
         mut put: impl FnMut(usize, f64) -> bool,
     ) -> Result<(), Fault> {
+        let mut needed = 0;
         for reference in references {
             self.table.typed(*reference, self.state.interface.standard(), called, &is)?;
+            needed |= self.table.access[*reference as usize];
+        }
+        if self.state.phase != Phase::Instantiated {
+            self.refresh(needed & ALL_PARTS)?;
         }
         for (i, reference) in references.iter().enumerate() {
             let value = self.state.values[*reference as usize];

@@ -65,16 +65,6 @@ pub enum ParameterError {
         /// What would be accepted
         allowed: String,
     },
-    /// A file that a parameter names.
-    #[error("{variable} = \"{file}\" is refused: {problem}")]
-    File {
-        /// Name of the parameter
-        variable: &'static str,
-        /// The file
-        file: String,
-        /// What is wrong with it, with value and allowed range
-        problem: String,
-    },
     /// The equations have no value at the start.
     #[error("no consistent start: {0}")]
     Start(#[from] EvaluationError),

@@ -261,6 +261,16 @@ pub trait System<const N: usize, const Z: usize> {
         Pace { stiff: false, span: f64::INFINITY }
     }
 
+    /// How long a step of an adaptive method may be now [s], for rates with kinks that its error estimate may not see.
+    fn longest_step(
+        &self,
+        _x: &[f64; N],
+        _u: &<Self::Model as Model>::Inputs<f64>,
+        _d: &<Self::Model as Model>::Discrete,
+    ) -> f64 {
+        f64::INFINITY
+    }
+
     /// How the equations are linear now, for `solver.method = exact`; otherwise another method takes the step.
     fn linear(
         &self,

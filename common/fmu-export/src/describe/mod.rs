@@ -222,7 +222,8 @@ impl Unknowns {
         let all = || 0..table.variables.len();
         let outputs: Vec<_> = all().filter(|i| of(i).entry.causality == Causality::Output).collect();
         let derivatives: Vec<_> = all().filter(|i| of(i).derivative_of.is_some()).collect();
-        let calculated: Vec<_> = all().filter(|i| of(i).entry.causality == Causality::CalculatedParameter).collect();
+        let calculated: Vec<_> =
+            all().filter(|i| of(i).entry.causality == Causality::CalculatedParameter).collect();
         let mut initial = [&outputs[..], &table.states, &derivatives, &calculated[..]].concat();
         initial.retain(|i| of(i).entry.initial != Initial::Exact);
         initial.sort_unstable();

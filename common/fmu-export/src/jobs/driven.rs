@@ -114,6 +114,12 @@ impl<const N: usize, const Z: usize, Y: System<N, Z>> Driven<'_, N, Z, Y> {
         span
     }
 
+    /// How long the next step may be.
+    pub(super) fn longest_step(&self, t: f64, x: &[f64; N]) -> f64 {
+        inputs_at!(self, t, u);
+        self.system.longest_step(x, u, &self.d)
+    }
+
     /// Carry out the time events that are due at `t`.
     pub(super) fn pass_events(&mut self, t: f64, x: &mut [f64; N], solver: &mut Solver) {
         for _ in 0..MAX_UPDATES {

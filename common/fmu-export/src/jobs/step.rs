@@ -66,6 +66,7 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
             course: self.course.map(RefCell::new),
             d,
         };
+        let adaptive = solver.settings().method.is_adaptive();
         let mut t = from;
         let most_work = statistics.work(N) + MAX_EVALUATIONS;
         loop {
@@ -84,6 +85,12 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
                 let span = driven.choose_method(t, &x, &mut solver);
                 if span < 0.75 * (target - t) {
                     target = t + span;
+                }
+            }
+            if adaptive {
+                let longest = driven.longest_step(t, &x);
+                if longest < 0.75 * (target - t) {
+                    target = t + longest;
                 }
             }
             if Z == 0 {

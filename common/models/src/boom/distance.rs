@@ -97,7 +97,8 @@ impl<'a> Pair<'a> {
                     continue;
                 }
                 let ([k, l], [m, n]) = ([(i + 1) % 3, (i + 2) % 3], [(j + 1) % 3, (j + 2) % 3]);
-                let reach = a[k] * c[l][j].abs() + a[l] * c[k][j].abs() + b[m] * c[i][n].abs() + b[n] * c[i][m].abs();
+                let reach =
+                    a[k] * c[l][j].abs() + a[l] * c[k][j].abs() + b[m] * c[i][n].abs() + b[n] * c[i][m].abs();
                 let along = p[l] * c[k][j] - p[k] * c[l][j];
                 gap = gap.max((along.abs() - reach) / sine_2.sqrt());
             }
@@ -190,11 +191,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn upright(center: [f64; 3], half: [f64; 3]) -> PlacedBox {
-        PlacedBox {
-            center: center.into(),
-            half,
-            axes: [Vector3::x(), Vector3::y(), Vector3::z()],
-        }
+        PlacedBox { center: center.into(), half, axes: [Vector3::x(), Vector3::y(), Vector3::z()] }
     }
 
     fn turned(b: &PlacedBox, r: &Rotation3<f64>, shift: Vector3<f64>) -> PlacedBox {

@@ -201,7 +201,8 @@ impl Limits {
             };
             shrink(&mut rate[i], &mut stage[i], V::constant(self.rate_max[i]), stage::RATE);
             if let Some(levers) = &geometry.levers {
-                let lever = if levers[i].plain() > LEAST_LEVER { levers[i] } else { V::constant(LEAST_LEVER) };
+                let lever =
+                    if levers[i].plain() > LEAST_LEVER { levers[i] } else { V::constant(LEAST_LEVER) };
                 let bound = V::constant(self.tangential_max[i]) / lever;
                 shrink(&mut rate[i], &mut stage[i], bound, stage::TANGENTIAL);
             }
@@ -212,7 +213,12 @@ impl Limits {
         Limited { rate, stage }
     }
 
-    fn limit_flows<V: Value>(&self, rate: &mut [V; JOINTS], stage: &mut [u8; JOINTS], intakes: &[Intake<V>; JOINTS]) {
+    fn limit_flows<V: Value>(
+        &self,
+        rate: &mut [V; JOINTS],
+        stage: &mut [u8; JOINTS],
+        intakes: &[Intake<V>; JOINTS],
+    ) {
         let mut total = V::constant(0.0);
         for i in 0..JOINTS {
             let limit = self.flow_max[i][intakes[i].direction(rate[i].plain())];

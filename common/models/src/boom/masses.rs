@@ -79,7 +79,11 @@ impl Masses {
     }
 
     /// Where the masses are (B13).
-    pub fn distribution<S: Scalar>(&self, frames: &Frames<S>, strokes: &[Stroke<S>; CYLINDERS]) -> Distribution<S> {
+    pub fn distribution<S: Scalar>(
+        &self,
+        frames: &Frames<S>,
+        strokes: &[Stroke<S>; CYLINDERS],
+    ) -> Distribution<S> {
         let lift = |p: &Vector3<f64>| p.map(S::lift);
         let empty = Lump { mass: S::lift(0.0), moment: Vector3::zeros() };
         let mut lumps = [empty; JOINTS + 1];
@@ -96,7 +100,8 @@ impl Masses {
             tank -= parts.oil;
             let [x, y] = cylinder.linkage.pin();
             let pin = frames.point(carrier, &Vector3::new(S::lift(x), S::lift(y), S::lift(0.0)));
-            let plane = |p: nalgebra::Vector2<S>| frames.turned(carrier, &Vector3::new(p.x, p.y, S::lift(0.0)));
+            let plane =
+                |p: nalgebra::Vector2<S>| frames.turned(carrier, &Vector3::new(p.x, p.y, S::lift(0.0)));
             let (e, e_slope) = (plane(strokes[i].e), plane(strokes[i].e_slope));
             lumps[carrier].add(&Lump { mass: parts.mass, moment: pin * parts.mass + e * parts.moment });
             own[i] = pin * parts.oil_slope + e * parts.moment_slope + e_slope * parts.moment

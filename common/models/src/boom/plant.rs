@@ -103,9 +103,8 @@ impl Boom {
 
 impl Model for Boom {
     const NAME: &'static str = "boom";
-    const DESCRIPTION: &'static str =
-        "Boom of a truck-mounted concrete pump: kinematics, limited rates, flows, torques, stability, distances";
-    const EXPERIMENT: Experiment = Experiment { stop: 100.0, step: 0.1 };
+    const DESCRIPTION: &'static str = "Boom of a truck-mounted concrete pump: kinematics, limited rates, flows, torques, stability, distances";
+    const EXPERIMENT: Experiment = Experiment { stop: 200.0, step: 1.0 };
     const DOCUMENTATION: Documentation = model::documentation!(
         "boom",
         inputs,
@@ -130,12 +129,7 @@ impl Model for Boom {
     type Discrete = Rest;
 
     fn new(p: &Parameters, _start: &Motion<f64>) -> Result<Self, ParameterError> {
-        let machine = Machine::compiled_in().map_err(|problem| ParameterError::File {
-            variable: "machine.file",
-            file: String::new(),
-            problem: problem.to_string(),
-        })?;
-        Self::of(machine, p)
+        Self::of(Machine::compiled_in(), p)
     }
 
     fn retune(&mut self, p: &Parameters) {
@@ -157,4 +151,3 @@ impl Model for Boom {
         }
     }
 }
-

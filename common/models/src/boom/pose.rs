@@ -83,11 +83,7 @@ impl Boom {
     }
 
     /// The same with time derivatives at the rates `q_dot`.
-    fn moving_geometry<S: Scalar>(
-        &self,
-        pose: &Pose<S>,
-        velocities: &Velocities<S>,
-    ) -> Geometry<Jet<S>> {
+    fn moving_geometry<S: Scalar>(&self, pose: &Pose<S>, velocities: &Velocities<S>) -> Geometry<Jet<S>> {
         let zero = S::lift(0.0);
         let levers = self.limits.needs_levers().then(|| {
             std::array::from_fn(|i| {
@@ -189,7 +185,12 @@ impl Boom {
     }
 
     /// Rates of the lag: w' = (clip(u) - w)/tau, 0 where a joint rests at the end of its range.
-    pub(super) fn lag<S: Scalar>(&self, w: &[S; JOINTS], command: &[S; JOINTS], resting: &[bool; JOINTS]) -> [S; JOINTS] {
+    pub(super) fn lag<S: Scalar>(
+        &self,
+        w: &[S; JOINTS],
+        command: &[S; JOINTS],
+        resting: &[bool; JOINTS],
+    ) -> [S; JOINTS] {
         let aim = self.clipped(command);
         std::array::from_fn(|i| if resting[i] { S::lift(0.0) } else { (aim[i] - w[i]) / self.time_constant })
     }

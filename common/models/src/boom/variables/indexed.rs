@@ -56,6 +56,22 @@ macro_rules! indexed_vectors {
     };
 }
 
+/// A number of things, whole in whatever numbers the equations are evaluated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Count<S>(pub S);
+
+impl<S: Scalar> Variables<S> for Count<S> {
+    const TABLE: &'static [Entry] = &[Entry::scalar("", Kind::Int64)];
+    #[inline]
+    fn load(values: &[S]) -> Self {
+        Self(values[0])
+    }
+    #[inline]
+    fn store(&self, values: &mut [S]) {
+        values[0] = self.0;
+    }
+}
+
 indexed! {
     /// Start angles of the joints
     AngleStarts[6] ".angle_start": 1 2 3 4 5 6;

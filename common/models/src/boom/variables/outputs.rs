@@ -3,9 +3,9 @@
 use model::{Variables, Vector3};
 
 use super::indexed::{
-    Accelerations, Angles, Flows, Forces, GravityTorques, HoldingTorques, LoadTorques, OfArms, OfJoints,
-    PointAccelerations, PointVelocities, Positions, Pressures, Slopes, Speeds, Strokes, Tangential1, Tangential2,
-    Tangential3, Tangential4, Tangential5, Tangential6, Velocities,
+    Accelerations, Angles, Count, Flows, Forces, GravityTorques, HoldingTorques, LoadTorques, OfArms,
+    OfJoints, PointAccelerations, PointVelocities, Positions, Pressures, Slopes, Speeds, Strokes,
+    Tangential1, Tangential2, Tangential3, Tangential4, Tangential5, Tangential6, Velocities,
 };
 
 /// The total flow couples every rate with every command.
@@ -111,8 +111,8 @@ pub struct Motion<S> {
     #[var(name = "flag.at_limit", discrete, min = 0.0, max = 1.0)]
     pub at_limit: OfJoints<S>,
     /// Arrivals at the end of a joint's range since the start
-    #[var(name = "solver.events", local, discrete, min = 0.0)]
-    pub events: S,
+    #[var(name = "solver.events", local)]
+    pub events: Count<S>,
 }
 
 /// Centre of mass, distances, heights and tip-over angles.
@@ -159,8 +159,8 @@ pub struct Safety<S> {
     #[var(name = "flag.below_threshold", discrete, min = 0.0, max = 1.0)]
     pub below_threshold: S,
     /// Pairs of boxes whose distance was computed for the present values
-    #[var(name = "solver.distance_evaluations", local, discrete, min = 0.0)]
-    pub evaluations: S,
+    #[var(name = "solver.distance_evaluations", local)]
+    pub evaluations: Count<S>,
 }
 
 /// Accelerations, torques and forces.
