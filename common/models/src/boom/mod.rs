@@ -8,11 +8,11 @@ mod limiter;
 pub mod linkage;
 pub mod machine;
 pub mod masses;
+mod plant;
 mod pose;
+mod report;
 pub mod stability;
 mod system;
 pub mod variables;
-
-mod plant;
 
 pub use plant::Boom;

@@ -281,7 +281,10 @@ mod tests {
         says(&open, &["linkage of cylinder[3] does not close", "joint[3].angle", "(B5)"]);
         says(&cylinder(1, "stroke_max", 0.5), &["stroke of cylinder[2]", "allowed: 0 .. 0.5 m", "(B6)"]);
         says(&cylinder(1, "length_min", 9.0), &["stroke of cylinder[2] is -"]);
-        let dead = refusal(|m| m["joint"]["max"][1] = json!(3.0));
+        let dead = refusal(|m| {
+            m["joint"]["max"][1] = json!(3.0);
+            m["cylinder"][1]["stroke_max"] = json!(3.0);
+        });
         says(&dead, &["ds/dq of cylinder[2] changes its sign", "(B8)"]);
     }
 

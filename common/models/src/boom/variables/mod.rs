@@ -72,22 +72,22 @@ pub struct Parameters {
         start = [0.0, 0.0, -3.089_232_776, 3.071_779_483_5, -3.106_686_068_5, 3.115_412_714_8]
     )]
     pub angle_start: AngleStarts<f64>,
-    /// Largest rate of the joint; -1: that of the variant [rad/s]
+    /// Largest rate of the joint, > 0; -1: that of the variant [rad/s]
     #[var(name = "joint", start = -1.0, above = 0.0, or = -1.0, tunable)]
     pub rate_max: RatesMax<f64>,
-    /// Largest tangential speed of the later link ends by the joint; -1: that of the variant [m/s]
+    /// Largest tangential speed of the later link ends by the joint, > 0; -1: that of the variant [m/s]
     #[var(name = "joint", start = -1.0, above = 0.0, or = -1.0, tunable)]
     pub tangential_max: TangentialsMax<f64>,
-    /// Largest flow of the extending cylinder; -1: that of the variant [m3/s]
+    /// Largest flow of the extending cylinder, >= 0; -1: that of the variant [m3/s]
     #[var(name = "cylinder", start = -1.0, min = 0.0, or = -1.0, nominal = 1e-3, tunable)]
     pub flow_max_extend: FlowsMaxExtend<f64>,
-    /// Largest flow of the retracting cylinder; -1: that of the variant [m3/s]
+    /// Largest flow of the retracting cylinder, >= 0; -1: that of the variant [m3/s]
     #[var(name = "cylinder", start = -1.0, min = 0.0, or = -1.0, nominal = 1e-3, tunable)]
     pub flow_max_retract: FlowsMaxRetract<f64>,
-    /// Largest flow of the slew motor, both ways; -1: that of the variant [m3/s]
+    /// Largest flow of the slew motor, both ways, >= 0; -1: that of the variant [m3/s]
     #[var(name = "slew.flow_max", start = -1.0, min = 0.0, or = -1.0, nominal = 1e-3, tunable)]
     pub slew_flow_max: f64,
-    /// Largest flow of all actuators together; -1: that of the variant [m3/s]
+    /// Largest flow of all actuators together, >= 0; -1: that of the variant [m3/s]
     #[var(name = "hydraulics.flow_total_max", start = -1.0, min = 0.0, or = -1.0, nominal = 1e-3, tunable)]
     pub flow_total_max: f64,
     /// Lag of the rates behind their commands; 0: none [s]
