@@ -92,7 +92,7 @@ def _views(side, top, result: Result):
         top.plot(points[:, 0], points[:, 1], "o-", color=color, markersize=3)
     side.axhline(0.0, color="0.6")
     side.set(title="side view", xlabel="away from the slewing axis [m]", ylabel="height [m]", aspect="equal")
-    side.legend(fontsize="small")
+    side.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
     top.plot(0.0, 0.0, "k+", markersize=10)
     top.set(title="top view", xlabel="x, forward [m]", ylabel="y, left [m]", aspect="equal")
 
@@ -132,7 +132,7 @@ def draw(result: Result, profile: Profile, path):
 
     figure, axes = pyplot.subplots(2, 4, figsize=(17.0, 8.0), layout="constrained")
     _views(axes[0, 0], axes[1, 0], result)
-    _curves(axes[:, 1:].flat, result)
+    _curves(list(axes[:, 1:].flat), result)
     variant, support = PROFILES[profile.name]
     figure.suptitle(f"variant {variant}, {support} support")
     figure.savefig(path, dpi=80, metadata={"Software": None})
