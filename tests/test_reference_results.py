@@ -255,6 +255,11 @@ def test_boom(packed):
 
 
 # a run at default settings ----------------------------------------------------------------------------------------
+#: Part of a value that steps of half the size do not take away, if it is more than rounding: the boom's solver takes its
+#: own steps of 0.05 s at most, whatever the host's, and leaves 3e-9 at the kinks of its rates.
+LEFT = {"boom": 6e-9}
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_run_at_default_settings(fmu, packed, name):
     """Steps of half the size take away at least half of the error, whatever the order: the error is at most twice the
@@ -266,7 +271,7 @@ def test_run_at_default_settings(fmu, packed, name):
     assert np.abs(coarse.t - reference.t).max() <= 1e-11
     scale = np.maximum(np.abs(reference.values).max(axis=0), list(reference.nominal.values()))
     error = np.abs(coarse.values - reference.values).max(axis=0)
-    allowed = 2.0 * np.abs(coarse.values - fine.values).max(axis=0) + 1e-10 * scale
+    allowed = 2.0 * np.abs(coarse.values - fine.values).max(axis=0) + LEFT.get(name, 1e-10) * scale
     wrong = {n: (e, a) for n, e, a in zip(reference.names, error, allowed) if e > a}
     assert not wrong
     assert (error <= 2e-5 * scale).all(), dict(zip(reference.names, error / scale))
