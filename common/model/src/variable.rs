@@ -139,6 +139,7 @@ pub struct Rate {
 
 /// What a field's attributes say about its variables; `None` and empty leave things as they are.
 #[derive(Debug, Clone, Copy)]
+#[allow(clippy::struct_excessive_bools, reason = "marks that have nothing to do with each other")]
 pub struct Attributes {
     /// Comes before the names of the field's own variables
     pub prefix: &'static str,
