@@ -11,7 +11,8 @@ use std::time::{Duration, Instant};
 
 use model::{Group, Model, Outputs, System, Variables, Visitor};
 use models::boom::Boom;
-use models::boom::variables::{Inputs, Parameters, Use, VariantKind};
+use models::boom::variables::VariantKind::{self, A, B, C};
+use models::boom::variables::{Inputs, Parameters, Use};
 
 type Motion = <Boom as Model>::Motion<f64>;
 
@@ -88,7 +89,6 @@ fn main() {
             println!("{name:36}{times}");
         }
     };
-    use VariantKind::{A, B, C};
     for (name, variant) in [("A", A), ("B", B), ("C", C)] {
         row(&format!("{name}, every part"), variant, ALL, 0.0);
         row(&format!("{name}, every part, lag"), variant, ALL, 0.5);

@@ -102,7 +102,9 @@ impl Variable {
         match self.range {
             Range::Declared => declared,
             Range::Any => true,
-            Range::MinusOneOr { zero } => declared && (value == -1.0 || value > 0.0 || zero && value == 0.0),
+            Range::MinusOneOr { zero } => {
+                declared && (value == -1.0 || value >= if zero { 0.0 } else { f64::MIN_POSITIVE })
+            }
         }
     }
 

@@ -179,7 +179,7 @@ impl Limits {
     pub(crate) fn limit<V: Value>(
         &self,
         u: &[V; JOINTS],
-        blocked: &[bool; JOINTS],
+        blocked: [bool; JOINTS],
         geometry: &Geometry<V>,
     ) -> Limited<V> {
         let (mut rate, mut stage) = (*u, [0; JOINTS]);

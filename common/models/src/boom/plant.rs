@@ -78,11 +78,11 @@ impl Boom {
             "joint[5].angle_start",
             "joint[6].angle_start",
         ];
-        for i in 0..JOINTS {
+        for (i, name) in NAMES.into_iter().enumerate() {
             let (angle, min, max) = (p.angle_start.0[i], machine.min[i], machine.max[i]);
             if angle < min - RANGE || angle > max + RANGE {
-                let reason = "it is outside the range of the joint in the machine file";
-                return Err(ParameterError::refused(NAMES[i], angle, reason, format!("{min} .. {max} rad")));
+                let reason = "it is outside the range of the joint";
+                return Err(ParameterError::refused(name, angle, reason, format!("{min} .. {max} rad")));
             }
         }
         let support = *machine.support(p.support as usize - 1);

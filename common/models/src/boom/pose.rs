@@ -1,6 +1,6 @@
 //! The machine at one pose and one set of rates: limiter, load at the tip, torques.
 
-use mechanics::{Scalar, Vector};
+use mechanics::Scalar;
 use model::{EvaluationError, Vector3};
 use nalgebra::Matrix3;
 
@@ -20,13 +20,21 @@ pub(super) fn finite<S: Scalar>(command: &[S; JOINTS]) -> [S; JOINTS] {
     command.map(|u| if u.re().is_finite() { u } else { S::lift(0.0) })
 }
 
-/// The load of the followers on the tip: F and M; `None` if nothing hangs there.
-pub(super) type TipLoad<S> = Option<(Vector3<S>, Option<Matrix3<S>>)>;
+/// The load of the followers on the tip: `F - M a`.
+pub(super) struct TipLoad<S> {
+    F: Vector3<S>,
+    M: Option<Matrix3<S>>,
+}
 
-/// Slot load, checked.
-pub(super) fn tip_load<S: Scalar>(u: &Inputs<S>) -> Result<TipLoad<S>, EvaluationError> {
-    let Some(load) = slots::<S, 3>(&[&u.TIP]) else { return Ok(None) };
-    if let Some(M) = &load.M {
+/// The load on the slot; `None` if nothing hangs there.
+pub(super) fn tip_load<S: Scalar>(u: &Inputs<S>) -> Option<TipLoad<S>> {
+    slots::<S, 3>(&[&u.TIP]).map(|load| TipLoad { F: load.F, M: load.M })
+}
+
+/// The same, refused if M is the inertia of nothing: for what depends on all of M.
+pub(super) fn checked_tip_load<S: Scalar>(u: &Inputs<S>) -> Result<Option<TipLoad<S>>, EvaluationError> {
+    let load = tip_load(u);
+    if let Some(TipLoad { M: Some(M), .. }) = &load {
         let eigenvalues = M.map(S::re).symmetric_eigenvalues();
         let (least, largest) = (eigenvalues.min(), eigenvalues.amax());
         if least < -SEMIDEFINITE * largest {
@@ -38,8 +46,7 @@ pub(super) fn tip_load<S: Scalar>(u: &Inputs<S>) -> Result<TipLoad<S>, Evaluatio
             });
         }
     }
-    let F: Vector<S, 3> = load.F;
-    Ok(Some((F, load.M)))
+    Ok(load)
 }
 
 impl Boom {
@@ -155,21 +162,20 @@ impl Boom {
         q: &[S; JOINTS],
         w: Option<&[S; JOINTS]>,
         command: &[S; JOINTS],
-        resting: &[bool; JOINTS],
+        resting: [bool; JOINTS],
     ) -> Pose<S> {
         let frames = self.chain.frames(q);
         let strokes = (self.uses.hydraulics || self.limits.needs_slopes()).then(|| self.strokes(q));
         let wanted = w.map_or_else(|| finite(command), |w| *w);
-        let blocked = *resting;
         let geometry = self.geometry(q, Some(&frames), strokes.as_ref());
-        let Limited { rate, mut stage } = self.limits.limit(&wanted, &blocked, &geometry);
+        let Limited { rate, mut stage } = self.limits.limit(&wanted, resting, &geometry);
         for i in 0..JOINTS {
             if !command[i].re().is_finite() {
                 stage[i] |= stage::NOT_FINITE;
             }
         }
         let velocities = frames.velocities(&rate);
-        Pose { q: *q, frames, strokes, wanted, blocked, rate, stage, velocities }
+        Pose { q: *q, frames, strokes, wanted, resting, rate, stage, velocities }
     }
 
     /// Second derivatives of the angles (B20a); zero without lag.
@@ -181,7 +187,7 @@ impl Boom {
         let Some(w_dot) = w_dot else { return [S::lift(0.0); JOINTS] };
         let wanted = std::array::from_fn(|i| Jet { value: pose.wanted[i], rate: w_dot[i] });
         let geometry = self.moving_geometry(pose, &pose.velocities);
-        self.limits.limit(&wanted, &pose.blocked, &geometry).rate.map(|r| r.rate)
+        self.limits.limit(&wanted, pose.resting, &geometry).rate.map(|r| r.rate)
     }
 
     /// Rates of the lag: w' = (clip(u) - w)/tau, 0 where a joint rests at the end of its range.
@@ -189,7 +195,7 @@ impl Boom {
         &self,
         w: &[S; JOINTS],
         command: &[S; JOINTS],
-        resting: &[bool; JOINTS],
+        resting: [bool; JOINTS],
     ) -> [S; JOINTS] {
         let aim = self.clipped(command);
         std::array::from_fn(|i| if resting[i] { S::lift(0.0) } else { (aim[i] - w[i]) / self.time_constant })
@@ -204,7 +210,8 @@ pub(super) struct Pose<S> {
     pub(super) strokes: Option<[Stroke<S>; CYLINDERS]>,
     /// Rates before the limiter
     wanted: [S; JOINTS],
-    blocked: [bool; JOINTS],
+    /// Joints that stay at an end of their range
+    resting: [bool; JOINTS],
     /// Rates after the limiter
     pub(super) rate: [S; JOINTS],
     pub(super) stage: [u8; JOINTS],
@@ -213,11 +220,15 @@ pub(super) struct Pose<S> {
 
 impl<S: Scalar> Pose<S> {
     /// Force on the tip (B21) at the tip's acceleration.
-    pub(super) fn tip_force(&self, load: &TipLoad<S>, q_ddot: impl FnOnce() -> [S; JOINTS]) -> Vector3<S> {
+    pub(super) fn tip_force(
+        &self,
+        load: Option<&TipLoad<S>>,
+        q_ddot: impl FnOnce() -> [S; JOINTS],
+    ) -> Vector3<S> {
         match load {
             None => Vector3::zeros(),
-            Some((F, None)) => *F,
-            Some((F, Some(M))) => {
+            Some(TipLoad { F, M: None }) => *F,
+            Some(TipLoad { F, M: Some(M) }) => {
                 let a = self.frames.accelerations(&self.velocities, &self.rate, &q_ddot());
                 F - M * a[JOINTS]
             }

@@ -6,7 +6,7 @@ use model::{Dense, EvaluationError, ParameterError, Spectrum, System};
 use super::limiter::Limited;
 use super::machine::JOINTS;
 use super::plant::{Boom, Rest};
-use super::pose::{Pose, TipLoad, finite, tip_load};
+use super::pose::{Pose, TipLoad, checked_tip_load, finite, tip_load};
 use super::variables::Inputs;
 use super::variables::outputs::{Dynamics, Energy, Motion, Safety};
 
@@ -68,7 +68,7 @@ impl<const N: usize> Plant<'_, N> {
     fn pose<S: Scalar>(&self, x: &[S; N], u: &Inputs<S>) -> Pose<S> {
         let Parts { q, w, .. } = parts(x);
         let resting = self.0.resting(&q, w.as_ref(), &u.command.0);
-        self.0.pose(&q, w.as_ref(), &u.command.0, &resting)
+        self.0.pose(&q, w.as_ref(), &u.command.0, resting)
     }
 
     /// Second derivatives of the angles.
@@ -78,7 +78,7 @@ impl<const N: usize> Plant<'_, N> {
         w: Option<&[S; JOINTS]>,
         u: &Inputs<S>,
     ) -> [S; JOINTS] {
-        let w_dot = w.map(|w| self.0.lag(w, &u.command.0, &self.0.resting(&pose.q, Some(w), &u.command.0)));
+        let w_dot = w.map(|w| self.0.lag(w, &u.command.0, self.0.resting(&pose.q, Some(w), &u.command.0)));
         self.0.accelerations(pose, w_dot.as_ref())
     }
 
@@ -87,7 +87,7 @@ impl<const N: usize> Plant<'_, N> {
         &self,
         pose: &Pose<S>,
         w: Option<&[S; JOINTS]>,
-        load: &TipLoad<S>,
+        load: Option<&TipLoad<S>>,
         u: &Inputs<S>,
     ) -> [S; 2] {
         let F = pose.tip_force(load, || self.accelerations(pose, w, u));
@@ -128,20 +128,20 @@ where
         d: &Rest,
     ) -> Result<[S; N], EvaluationError> {
         let Parts { q, w, .. } = parts(x);
-        let load = tip_load(u)?;
+        let load = checked_tip_load(u)?;
         let mut rates = [S::lift(0.0); N];
         if self.0.uses.energy {
-            let pose = self.0.pose(&q, w.as_ref(), &u.command.0, &d.resting);
+            let pose = self.0.pose(&q, w.as_ref(), &u.command.0, d.resting);
             rates[..JOINTS].copy_from_slice(&pose.rate);
-            rates[N - 2..].copy_from_slice(&self.powers(&pose, w.as_ref(), &load, u));
+            rates[N - 2..].copy_from_slice(&self.powers(&pose, w.as_ref(), load.as_ref(), u));
         } else {
             let wanted = w.unwrap_or_else(|| finite(&u.command.0));
             let Limited { rate, .. } =
-                self.0.limits.limit(&wanted, &d.resting, &self.0.geometry(&q, None, None));
+                self.0.limits.limit(&wanted, d.resting, &self.0.geometry(&q, None, None));
             rates[..JOINTS].copy_from_slice(&rate);
         }
         if let Some(w) = &w {
-            rates[JOINTS..2 * JOINTS].copy_from_slice(&self.0.lag(w, &u.command.0, &d.resting));
+            rates[JOINTS..2 * JOINTS].copy_from_slice(&self.0.lag(w, &u.command.0, d.resting));
         }
         Ok(rates)
     }
@@ -164,12 +164,12 @@ where
         u: &Inputs<S>,
         _d: &Rest,
     ) -> Result<Safety<S>, EvaluationError> {
-        let load = tip_load(u)?;
+        let load = tip_load(u);
         let Parts { q, w, .. } = parts(x);
         let frames = self.0.chain.frames(&q);
         let tip_force = (self.0.include_tip_force && load.is_some()).then(|| {
             let pose = self.pose(x, u);
-            pose.tip_force(&load, || self.accelerations(&pose, w.as_ref(), u)).z
+            pose.tip_force(load.as_ref(), || self.accelerations(&pose, w.as_ref(), u)).z
         });
         Ok(self.0.safety(&frames, &self.0.strokes(&q), tip_force))
     }
@@ -181,10 +181,10 @@ where
         u: &Inputs<S>,
         _d: &Rest,
     ) -> Result<Dynamics<S>, EvaluationError> {
-        let load = tip_load(u)?;
+        let load = checked_tip_load(u)?;
         let pose = self.pose(x, u);
         let q_ddot = self.accelerations(&pose, parts(x).w.as_ref(), u);
-        let F = pose.tip_force(&load, || q_ddot);
+        let F = pose.tip_force(load.as_ref(), || q_ddot);
         Ok(self.0.dynamics(&pose, &q_ddot, &F))
     }
 
@@ -195,7 +195,6 @@ where
         u: &Inputs<S>,
         _d: &Rest,
     ) -> Result<Energy<S>, EvaluationError> {
-        tip_load(u)?;
         let Parts { q, drives, port, .. } = parts(x);
         let frames = self.0.chain.frames(&q);
         let masses = self.0.masses.distribution(&frames, &self.0.strokes(&q));

@@ -26,7 +26,9 @@ fn declared_dependencies_are_exact() {
     for settings in settings {
         for _ in 0..20 {
             let mut fmu = Named::<Boom>::with_interface(Interface::CoSimulationWithEvents);
-            settings.iter().for_each(|(name, value)| set(&mut fmu, name, *value));
+            for (name, value) in settings {
+                set(&mut fmu, name, *value);
+            }
             set_angles(&mut fmu, std::array::from_fn(|i| random.between(machine.min[i], machine.max[i])));
             // from rates that pass every stage to rates that all stages cut
             let mut command =

@@ -26,7 +26,9 @@ fn count(fmu: &mut Named<Boom>, name: &str) -> u64 {
 /// A boom with settings, not initialised yet.
 fn boom(settings: &[(&str, f64)]) -> Named<Boom> {
     let mut fmu = Named::<Boom>::default();
-    settings.iter().for_each(|(name, value)| set(&mut fmu, name, *value));
+    for (name, value) in settings {
+        set(&mut fmu, name, *value);
+    }
     fmu
 }
 

@@ -177,15 +177,15 @@ pub(super) struct Supports {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub(super) struct Arms {
     #[serde(rename = "2")]
-    pub(super) arm_2: BoxShape,
+    pub(super) second: BoxShape,
     #[serde(rename = "3")]
-    pub(super) arm_3: BoxShape,
+    pub(super) third: BoxShape,
     #[serde(rename = "4")]
-    pub(super) arm_4: BoxShape,
+    pub(super) fourth: BoxShape,
     #[serde(rename = "5")]
-    pub(super) arm_5: BoxShape,
+    pub(super) fifth: BoxShape,
     #[serde(rename = "6")]
-    pub(super) arm_6: BoxShape,
+    pub(super) sixth: BoxShape,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]

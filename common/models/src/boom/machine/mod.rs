@@ -133,7 +133,7 @@ impl Machine {
         }
         positive("pipe.inner_area".into(), pipe.inner_area)?;
         positive("pipe.concrete_density".into(), pipe.concrete_density)?;
-        let Arms { arm_2, arm_3, arm_4, arm_5, arm_6 } = boxes.arm;
+        let Arms { second, third, fourth, fifth, sixth } = boxes.arm;
         if boxes.extra.len() > MAX_EXTRA {
             return Err(MachineError::Syntax(format!(
                 "box.extra has {} boxes; allowed: 0 .. {MAX_EXTRA}",
@@ -151,7 +151,7 @@ impl Machine {
             arm_com: file.arm_com.map(Vector3::from),
             concrete: pipe.inner_area * pipe.concrete_density,
             oil: file.oil,
-            arms: [arm_2, arm_3, arm_4, arm_5, arm_6],
+            arms: [second, third, fourth, fifth, sixth],
             cylinders: std::array::from_fn(|i| found[i]),
             slew_displacement: file.slew.displacement,
             threshold: file.threshold,
