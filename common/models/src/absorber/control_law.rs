@@ -116,7 +116,7 @@ impl ControlLaw {
         let r = f * (2.0 * self.cos_alpha);
         let p = f / g * (4.0 * self.sin_alpha);
         let (n, eta) = match limit_cycle(r, p) {
-            Some(y) => (p / (y * y * y) - 1.0, r / y - 1.0),
+            Some(y) => factors(p / (y * y * y) - 1.0, r / y - 1.0, y),
             None => (S::lift(0.0), S::lift(0.0)),
         };
         Design { n, eta, X, f, g }
@@ -125,6 +125,11 @@ impl ControlLaw {
     fn scaled<S: Scalar>(&self, omega: S, X: S) -> (S, S) {
         (S::lift(self.F_d / self.m) / (omega * omega * X), omega * X * X * self.gamma)
     }
+}
+
+/// n and eta at a root y of (15), where n eta y = 1: the smaller one, a difference of nearly equal numbers, from the larger.
+fn factors<S: Scalar>(n: S, eta: S, y: S) -> (S, S) {
+    if n.re().abs() > eta.re().abs() { (n, S::lift(1.0) / (n * y)) } else { (S::lift(1.0) / (eta * y), eta) }
 }
 
 /// (15) scaled by X: the positive root y = l/X of `y^4 - (r + 1) y^3 - p y + p r` nearest to 1, if there is one.
