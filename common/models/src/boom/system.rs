@@ -192,7 +192,7 @@ where
         &self,
         _t: S,
         x: &[S; N],
-        u: &Inputs<S>,
+        _u: &Inputs<S>,
         _d: &Rest,
     ) -> Result<Energy<S>, EvaluationError> {
         let Parts { q, drives, port, .. } = parts(x);
