@@ -256,7 +256,7 @@ def test_boom(packed):
 
 # a run at default settings ----------------------------------------------------------------------------------------
 #: Part of a value that steps of half the size do not take away, if it is more than rounding: the boom's solver takes its
-#: own steps of 0.05 s at most, whatever the host's, and leaves 3e-9 at the kinks of its rates.
+#: own steps of 1e-3 rad, whatever the host's, and leaves 3e-9 at the kinks of its rates.
 LEFT = {"boom": 6e-9}
 
 

@@ -15,9 +15,9 @@ const ARRIVED: f64 = 1e-12;
 /// Event indicator per distance from the end of the range: its band of 1e-10 is then [`ARRIVED`] [1/rad].
 const SCALE: f64 = 100.0;
 
-/// Longest adaptive step while the limiter may switch [s]: the error estimate of `dopri5` is blind to a kink at 0.42 of
-/// the step, where the error is 0.004 h^2 times the jump of the acceleration.
-const LONGEST: f64 = 0.05;
+/// No joint turns by more in an adaptive step while the limiter acts [rad]: the error estimate of `dopri5` is blind to a
+/// kink at 0.42 of the step, where the error is 0.004 h^2 times the jump of the acceleration.
+const TURN: f64 = 1e-3;
 
 /// The boom with `N` states: 6 angles, behind a lag 6 wanted rates, 2 energy integrals.
 pub(super) struct Plant<'a, const N: usize>(pub(super) &'a Boom);
@@ -204,10 +204,16 @@ where
     }
 
     fn longest_step(&self, x: &[f64; N], u: &Inputs<f64>, d: &Rest) -> f64 {
-        let command = finite(&u.command.0);
-        let still = |i: usize| command[i].abs() <= 0.0 && parts(x).w.is_none_or(|w| w[i].abs() <= 0.0);
-        let kinks = self.0.limits.active && (0..JOINTS).any(|i| !d.resting[i] && !still(i));
-        if kinks { LONGEST } else { f64::INFINITY }
+        if !self.0.limits.active {
+            return f64::INFINITY;
+        }
+        let (Parts { q, w, .. }, aim) = (parts(x), self.0.clipped(&u.command.0));
+        let geometry = self.0.geometry(&q, None, None);
+        let fastest = |wanted: &[f64; JOINTS]| {
+            let rates = self.0.limits.limit(wanted, d.resting, &geometry).rate;
+            rates.into_iter().fold(0.0_f64, |most, rate| most.max(rate.abs()))
+        };
+        TURN / fastest(&aim).max(w.map_or(0.0, |w| fastest(&w)))
     }
 
     fn state_names(&self) -> [String; N] {
