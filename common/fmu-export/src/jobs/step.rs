@@ -89,7 +89,7 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
             }
             if adaptive {
                 let longest = driven.longest_step(t, &x);
-                if longest < 0.75 * (target - t) {
+                if longest < 0.75 * (target - t) && t + longest > t {
                     target = t + longest;
                 }
             }
