@@ -71,7 +71,7 @@ def test_energies_balance_and_port_works_cancel(scene):
     result = scene.run(integrator="rk4", step=0.01, stop=5.0, audit=True)
     assert result.energy.balance <= 1e-5
     assert result.energy.supplied.max() > 0.1
-    assert np.abs(result.energy.ports).max() <= 1e-8 * result.energy.largest_port
+    assert np.abs(result.energy.ports).max() <= 1e-8 * result.energy.largest
 
 
 # two chains ---------------------------------------------------------------------------------------------------------

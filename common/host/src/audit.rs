@@ -2,10 +2,10 @@
 //!
 //! ```text
 //! supplied   work from outside: of components that store energy, what they are supplied with; of all, less their port work
-//! balance    max |stored - stored(0) + dissipated - supplied| / largest energy that occurs
+//! balance    max |stored - stored(0) + dissipated - supplied| / largest change of any energy of any component
 //! ```
 //! Where both sides of a connection are in the scene their port works cancel. A source (load, guide) stores nothing: what
-//! leaves it through its port has come from outside.
+//! leaves it through its port has come from outside. The ports of a component that nothing is connected to are outside.
 
 use crate::scene::{Network, Recorded};
 
@@ -19,7 +19,6 @@ struct Column {
     stored: f64,
     dissipated: f64,
     supplied: f64,
-    port: bool,
 }
 
 /// Energies of the components, recorded beside other variables.
@@ -49,12 +48,14 @@ impl Audit {
         let recorded = offered(network, &ENERGIES);
         let is = |r: &Recorded, energy: &str| r.name.ends_with(energy);
         let storing = |node: usize| recorded.iter().any(|r| r.node == node && is(r, KINETIC));
+        let connected = |node: usize| {
+            network.signals.iter().any(|s| s.node == node) || network.sinks.iter().any(|s| s.node == node)
+        };
         let on = |condition: bool| f64::from(u8::from(condition));
         let column = |r: &Recorded| Column {
             stored: on(is(r, KINETIC) || is(r, "energy.potential")),
             dissipated: on(is(r, "energy.dissipated")),
-            supplied: on(is(r, SUPPLIED) && storing(r.node)) - on(is(r, PORT)),
-            port: is(r, PORT),
+            supplied: on(is(r, SUPPLIED) && storing(r.node)) - on(is(r, PORT) && connected(r.node)),
         };
         (Self { columns: recorded.iter().map(column).collect() }, recorded)
     }
@@ -71,10 +72,8 @@ impl Audit {
         for row in rows {
             let change = sum(row, |c| c.stored) - stored;
             let (dissipated, supplied) = (sum(row, |c| c.dissipated), sum(row, |c| c.supplied));
-            let ports = self.columns.iter().zip(&row[first..]).filter(|(column, _)| column.port);
-            let port = ports.map(|(_, work)| work.abs()).fold(0.0, f64::max);
-            largest =
-                [change.abs(), dissipated.abs(), supplied.abs(), port].into_iter().fold(largest, f64::max);
+            let changes = row[first..].iter().zip(&start[first..]).take(self.columns.len());
+            largest = changes.map(|(value, start)| (value - start).abs()).fold(largest, f64::max);
             wrong = wrong.max((change + dissipated - supplied).abs());
         }
         Some(if largest > 0.0 { wrong / largest } else { 0.0 })
@@ -90,9 +89,9 @@ mod tests {
     /// A body that is pushed: of 4 J through its port, 3 J are stored and half a joule is lost.
     #[test]
     fn what_is_missing_shows() {
-        let column = |stored, dissipated, supplied, port| Column { stored, dissipated, supplied, port };
-        let body = column(1.0, 0.0, 0.0, false);
-        let columns = vec![body, column(0.0, 1.0, 0.0, false), column(0.0, 0.0, -1.0, true)];
+        let column = |stored, dissipated, supplied| Column { stored, dissipated, supplied };
+        let body = column(1.0, 0.0, 0.0);
+        let columns = vec![body, column(0.0, 1.0, 0.0), column(0.0, 0.0, -1.0)];
         let audit = Audit { columns };
         let rows = [vec![9.0, 1.0, 0.0, 0.0], vec![9.0, 4.0, 0.5, -4.0]];
         assert!((audit.balance(&rows, 1).unwrap() - 0.5 / 4.0).abs() < 1e-15);

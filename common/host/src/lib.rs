@@ -11,6 +11,7 @@
 
 pub mod assembly;
 pub mod audit;
+pub mod check;
 pub mod cli;
 pub mod closure;
 pub mod error;

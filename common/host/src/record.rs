@@ -96,6 +96,12 @@ impl Recorder {
         self.enabled && self.interval.is_none_or(due)
     }
 
+    /// Keeps the first columns only.
+    pub fn keep(&mut self, columns: usize) {
+        self.names.truncate(columns);
+        self.rows.iter_mut().for_each(|row| row.truncate(columns));
+    }
+
     /// Largest gap of closing joints at recorded times [m].
     #[must_use]
     pub fn gap(&self) -> f64 {

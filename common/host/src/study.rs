@@ -240,7 +240,7 @@ fn computed(scene: &Scene, base: &Config, overrides: &[Override]) -> Result<Refe
 }
 
 /// Typical magnitude of a recorded variable: the scene's, else the FMU's.
-fn nominal(scene: &Scene, name: &str) -> f64 {
+pub(crate) fn nominal(scene: &Scene, name: &str) -> f64 {
     let norm = scene.system.settings.norms.iter().find(|(variable, _)| variable == name);
     let of_fmu = || scene.network.find(name, "record").map_or(1.0, |(_, variable)| variable.nominal);
     norm.map_or_else(of_fmu, |(_, value)| *value)

@@ -17,20 +17,17 @@ class EnergyAudit:
     supplied: np.ndarray
     #: Sum of the works that the components received through connected and open ports.
     ports: np.ndarray
-    #: Largest port work of a single component.
-    largest_port: float
+    #: Largest change of any energy of any component.
+    largest: float
 
     @property
     def balance(self) -> float:
-        """Largest |stored + dissipated - supplied - stored at the start| over the largest energy that occurs.
+        """Largest |stored + dissipated - supplied - stored at the start| over the largest change of any single energy.
 
         Port works are among `supplied`: where both sides of every connection are in the scene they cancel.
         """
-        change = self.stored - self.stored[0]
-        largest = max(float(np.abs(e).max()) for e in (change, self.dissipated, self.supplied))
-        largest = max(largest, self.largest_port)
-        wrong = float(np.abs(change + self.dissipated - self.supplied).max())
-        return wrong / largest if largest > 0.0 else 0.0
+        wrong = float(np.abs(self.stored - self.stored[0] + self.dissipated - self.supplied).max())
+        return wrong / self.largest if self.largest > 0.0 else 0.0
 
 
 @dataclass
@@ -67,33 +64,33 @@ class SceneResult(Result):
         )
 
 
-def _external(refs: list[tuple[str, str]], values: np.ndarray) -> np.ndarray:
+def _external(refs: list[tuple[str, str]], values: np.ndarray, connected: set[str]) -> np.ndarray:
     """Work from outside the scene: of every component all but what came through ports.
 
-    A source (load, guide) stores nothing: what leaves it through its port has come from outside.
+    A source (load, guide) stores nothing: what leaves it through its port has come from outside. The ports of a
+    component that nothing is connected to are outside.
     """
     storing = {name for name, energy in refs if energy == "energy.kinetic"}
     work = np.zeros(len(values))
     for i, (name, energy) in enumerate(refs):
-        if energy == "energy.port":
+        if energy == "energy.port" and name in connected:
             work -= values[:, i]
         elif energy == "energy.supplied" and name in storing:
             work += values[:, i]
     return work
 
 
-def audited(refs: list[tuple[str, str]], values: np.ndarray) -> EnergyAudit | None:
-    """Energies of the scene from those of its components, None without any."""
+def audited(refs: list[tuple[str, str]], values: np.ndarray, connected: set[str]) -> EnergyAudit | None:
+    """Energies of the scene from those of its components, None without any; `connected`: components with connections."""
     if not refs:
         return None
     total = lambda name: sum((values[:, i] for i, ref in enumerate(refs) if ref[1] == name), np.zeros(len(values)))
-    ports = [values[:, i] for i, ref in enumerate(refs) if ref[1] == "energy.port"]
     return EnergyAudit(
         stored=total("energy.kinetic") + total("energy.potential"),
         dissipated=total("energy.dissipated"),
-        supplied=_external(refs, values),
+        supplied=_external(refs, values, connected),
         ports=total("energy.port"),
-        largest_port=max((float(np.abs(port).max()) for port in ports), default=0.0),
+        largest=float(np.abs(values - values[0]).max()),
     )
 
 

@@ -113,6 +113,8 @@ def _result(scene: Scene, name: str, network: Network, method, samples, recorder
     recorded = isinstance(recorder, Recorder)
     gaps = recorder.gaps if recorded else np.zeros((0, 2))
     fmus = [component.fmu for component in scene.components.values()]
+    connected = {end[0] for connection in scene.connections for end in (connection.source, connection.target)}
+    connected |= {end.partition(".")[0] for joint in scene.joints for end in (joint.first, joint.second)}
     return SceneResult(
         t=samples if recorded else samples[:0],
         names=list(recorder.names) if recorded else [],
@@ -134,7 +136,7 @@ def _result(scene: Scene, name: str, network: Network, method, samples, recorder
         calls=calls,
         gap=gaps[:, 0],
         gap_rate=gaps[:, 1],
-        energy=audited(recorder.energy_refs, recorder.energies) if recorded else None,
+        energy=audited(recorder.energy_refs, recorder.energies, connected) if recorded else None,
         components=(len(fmus), _archives(fmus) if scene.archived is None else scene.archived),
         variables=(
             len(network.u) + len(network.y),

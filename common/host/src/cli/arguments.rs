@@ -33,6 +33,8 @@ pub(super) enum Command {
     Study(Study),
     /// Run a scene over a grid of parameters
     Sweep(Sweep),
+    /// Run FMUs and scenes through their stiff and extreme cases
+    Check(Check),
     /// Pack a scene's folder with its FMUs into an .ssp archive, or into one FMU
     Pack(Pack),
 }
@@ -168,6 +170,18 @@ pub(super) struct Sweep {
     /// Folder of FMUs that the scene does not hold
     #[arg(long, default_value = "dist/fmi3")]
     pub(super) fmus: PathBuf,
+}
+
+#[derive(Args)]
+pub(super) struct Check {
+    /// Folders with a check.toml; all below fmus and scenes unless given
+    pub(super) folders: Vec<PathBuf>,
+    /// Folder of FMUs
+    #[arg(long, default_value = "dist/fmi3")]
+    pub(super) fmus: PathBuf,
+    /// Table as a file: one row per run (.csv), or Markdown with one line per case
+    #[arg(long, short)]
+    pub(super) output: Option<PathBuf>,
 }
 
 #[derive(Args)]

@@ -8,6 +8,7 @@
 //! | 3 | a run failed |
 
 mod arguments;
+mod check;
 mod info;
 mod pack;
 mod progress;
@@ -45,6 +46,14 @@ enum CommandError {
     Sweep { failed: usize, runs: usize, path: PathBuf },
     #[error(transparent)]
     Assembly(Box<crate::assembly::AssemblyError>),
+    #[error(transparent)]
+    Check(#[from] crate::check::CheckError),
+    #[error("no check.toml in the folders below fmus and scenes; name folders that have one")]
+    NoPlan,
+    #[error("{wrong} of {runs} runs are wrong:\n{}", shown.join("\n"))]
+    Wrong { wrong: usize, runs: usize, shown: Vec<String> },
+    #[error("the table cannot be made: {0}")]
+    Table(csv::Error),
     #[error("--set {0:?}: component.variable=value is needed")]
     Assignment(String),
 }
@@ -69,9 +78,14 @@ impl CommandError {
                 Error::Scene(_) => 2,
                 Error::Run(_) => 3,
             },
-            Self::Write { .. } => 1,
-            Self::Assembly(_) | Self::Read { .. } | Self::Plan { .. } | Self::Assignment(_) => 2,
-            Self::Sweep { .. } | Self::Study(_) => 3,
+            Self::Write { .. } | Self::Table(_) => 1,
+            Self::Check(_)
+            | Self::NoPlan
+            | Self::Assembly(_)
+            | Self::Read { .. }
+            | Self::Plan { .. }
+            | Self::Assignment(_) => 2,
+            Self::Sweep { .. } | Self::Wrong { .. } | Self::Study(_) => 3,
         }
     }
 }
@@ -123,6 +137,7 @@ fn answer(arguments: &Arguments) -> Result<Answer, CommandError> {
         Command::Validate(options) => validate::validate(options),
         Command::Study(options) => study::study(options),
         Command::Sweep(options) => sweep::sweep(options),
+        Command::Check(options) => check::check(options),
         Command::Pack(options) => pack::pack(options),
     }
 }

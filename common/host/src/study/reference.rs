@@ -78,7 +78,7 @@ pub struct SignalError {
 
 impl Reference {
     /// A recorded run.
-    pub(super) fn recorded(recorder: &Recorder, source: String, accuracy: f64) -> Self {
+    pub(crate) fn recorded(recorder: &Recorder, source: String, accuracy: f64) -> Self {
         let column = |i: usize| recorder.rows.iter().map(|row| row[i]).collect();
         let columns = recorder.names.iter().enumerate().map(|(i, name)| (name.clone(), column(i)));
         Self { source, accuracy, times: recorder.times.clone(), columns: columns.collect() }

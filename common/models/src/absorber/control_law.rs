@@ -122,6 +122,12 @@ impl ControlLaw {
         Design { n, eta, X, f, g }
     }
 
+    /// X and f of the direct law.
+    pub fn direct_motion<S: Scalar>(&self, omega: S) -> (S, S) {
+        let X = S::lift(self.X);
+        (X, self.scaled(omega, X).0)
+    }
+
     fn scaled<S: Scalar>(&self, omega: S, X: S) -> (S, S) {
         (S::lift(self.F_d / self.m) / (omega * omega * X), omega * X * X * self.gamma)
     }

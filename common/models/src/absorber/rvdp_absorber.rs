@@ -383,12 +383,15 @@ where
         let (omega, p) = (u.omega, &self.p);
         let touched = if p.stop.used { (x[0].abs() - p.stop.limit).max(0.0) } else { 0.0 };
         let mut rate = (p.d + p.stop.k * touched * p.stop.chi) / p.m;
-        if let Ok(design) = self.design(omega)
-            && p.control.law != LawKind::Off
-            && u.enabled > 0.0
-        {
-            let square = 3.0 * x[1] * x[1] + omega * omega * (x[0] * x[0] - design.X * design.X);
-            rate += 0.5 * p.control.gamma * square + design.f * omega * self.law.sin_alpha - self.law.d / p.m;
+        // not `design`: the limit cycle, an eigenvalue problem, would be found anew in every span
+        let motion = match p.control.law {
+            LawKind::Paper => self.law.paper_design(omega).ok().map(|design| (design.X, design.f)),
+            LawKind::Direct => Some(self.law.direct_motion(omega)),
+            LawKind::Off => None,
+        };
+        if let Some((X, f)) = motion.filter(|_| u.enabled > 0.0) {
+            let square = 3.0 * x[1] * x[1] + omega * omega * (x[0] * x[0] - X * X);
+            rate += 0.5 * p.control.gamma * square + f * omega * self.law.sin_alpha - self.law.d / p.m;
         }
         Pace { stiff: rate.abs() > STIFF * omega, span: std::f64::consts::TAU / omega }
     }
