@@ -364,3 +364,13 @@ def test_the_pole_of_the_papers_law_is_refused(fmu):
     with fmu("rvdp_absorber").instantiate() as absorber:
         with pytest.raises(FmuError, match="n eta"):
             absorber.initialise(settings)
+
+
+def test_a_drive_faster_than_the_resolution_of_time_is_discarded(fmu):
+    """Spans of a period would not move the time; the state before the step remains."""
+    with fmu("rvdp_absorber").instantiate() as absorber:
+        absorber.initialise({"drive.omega": 1e60})
+        with pytest.raises(FmuError, match="more than 5000000 evaluations") as refused:
+            absorber.step(0.0, 0.1)
+        assert refused.value.status == Status.DISCARD
+        assert absorber.get("x") == 0.01

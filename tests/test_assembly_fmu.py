@@ -68,7 +68,7 @@ def test_fixed_steps_are_those_of_the_native_host(assembly, tmp_path, name, meth
 
 
 @each_scene
-@pytest.mark.parametrize("method", ["dopri5", "dop853"])
+@pytest.mark.parametrize("method", ["dopri5", "dop853", "radau5"])
 def test_adaptive_steps_are_those_of_the_native_host(assembly, tmp_path, name, method):
     """Communication points, also finer ones, do not touch the steps of the integrator."""
     one = assembly(name)
@@ -209,7 +209,7 @@ def test_outputs_depend_on_the_declared_inputs_only(assembly, name):
 
 # what is asked of every FMU -----------------------------------------------------------------------------------------
 @each_scene
-@pytest.mark.parametrize("method", ["rk4", "dopri5"])
+@pytest.mark.parametrize("method", ["rk4", "dopri5", "rodas4", "radau5"])
 @pytest.mark.parametrize("events", [False, True])
 def test_restore_and_repeat_is_bit_identical(assembly, name, method, events):
     """Saved between two ends of the integrator's steps."""

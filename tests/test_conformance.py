@@ -80,25 +80,35 @@ def test_fmpy_simulates_with_validation(fmu, name, interface, tmp_path):
 
 
 # terminals --------------------------------------------------------------------------------------------------------
-# ports of suspension.md, coupling.md, rvdp_absorber.md and boom.md by kind; the closed or fixed points of the assemblies are no ports
+# ports of suspension.md, coupling.md, rvdp_absorber.md, boom.md and effi.md by kind; closed or fixed points are no ports
 PORTS = {
     "boom": {"TIP": "leader"},
     "bushing": {"A": "follower", "B": "follower"},
     "double_pendulum": {"C": "leader"},
     "double_wishbone": {"P": "leader"},
+    "effi_controller": {"V": "leader.sampled", "W": "follower"},
+    "effi_plant": {"H": "leader"},
     "four_bar": {"P": "leader"},
     "guide": {"H": "leader", "P": "leader"},
     "link2": {"A": "follower", "B": "leader"},
     "link3": {"B": "follower", "C": "leader", "P": "leader"},
     "load": {"A": "follower"},
+    "operator_arm": {"H": "force"},
     "primary_oscillator": {"A": "follower", "P": "leader"},
     "rvdp_absorber": {"A": "follower", "P": "follower"},
     "strut_link": {"D": "follower", "C": "leader", "T": "force"},
+    "virtual_mechanism": {"H": "leader"},
+    "virtual_wall": {"A": "force"},
 }
 VECTOR = ("x", "y", "z")
 SYMMETRIC = ("xx", "xy", "xz", "yy", "yz", "zz")
 MEMBERS = [f"{quantity}.{axis}" for quantity in "rvaF" for axis in VECTOR] + [f"M.{axes}" for axes in SYMMETRIC]
+PLANAR_MEMBERS = [f"{quantity}.{axis}" for quantity in "rvaF" for axis in "xz"] + ["M.xx", "M.xz", "M.zz"]
 SCALAR_MEMBERS = ["s", "v", "a", "F", "M"]
+#: Models whose ports move in the plane, so that they have no y components.
+PLANAR = {"effi_controller", "effi_plant", "operator_arm", "virtual_mechanism"}
+#: A force law and a leader that is known at samples have no acceleration, the latter takes no inertia either.
+LACKS = {"force": ("a.",), "leader.sampled": ("a.", "M.")}
 #: Ports in one coordinate, and those that have both forms.
 SCALAR, BOTH = {("guide", "H"), ("rvdp_absorber", "P")}, {("primary_oscillator", "A"), ("primary_oscillator", "P")}
 
@@ -124,10 +134,11 @@ def test_members_of_leader_and_follower_meet_in_the_inertial_connection(fmu, nam
     """F of a leader is fed by F0 of a follower, M by M; the motion goes the other way."""
     for port, terminal in terminals(fmu(name)).items():
         of, kind = members(terminal), PORTS[name][port]
-        follows = kind != "leader"
+        follows = not kind.startswith("leader")
         scalar, spatial = (name, port) in SCALAR | BOTH, (name, port) not in SCALAR
-        wanted = SCALAR_MEMBERS * scalar + [m for m in MEMBERS if kind != "force" or not m.startswith("a.")] * spatial
-        true = ["force"] * scalar + [f"force.{axis}" for axis in VECTOR] * spatial if follows else []
+        axes, in_space = ("xz", PLANAR_MEMBERS) if name in PLANAR else (VECTOR, MEMBERS)
+        wanted = SCALAR_MEMBERS * scalar + [m for m in in_space if not m.startswith(LACKS.get(kind, ()))] * spatial
+        true = ["force"] * scalar + [f"force.{axis}" for axis in axes] * spatial if follows else []
         assert sorted(of) == sorted(wanted + true)
         for member, variable in of.items():
             quantity, dot, component = member.partition(".")
@@ -137,11 +148,14 @@ def test_members_of_leader_and_follower_meet_in_the_inertial_connection(fmu, nam
             assert fmu(name).variable(variable).causality == ("input" if motion == follows else "output")
 
 
-@pytest.mark.parametrize("name", ["double_wishbone", "link3"])
-def test_a_second_slot_is_a_terminal_inside(fmu, name):
-    slot = terminals(fmu(name))["P"].find("Terminal")
+@pytest.mark.parametrize(
+    ("name", "port"), [("double_wishbone", "P"), ("link3", "P"), ("effi_plant", "H"), ("virtual_mechanism", "H")]
+)
+def test_a_second_slot_is_a_terminal_inside(fmu, name, port):
+    slot = terminals(fmu(name))[port].find("Terminal")
     assert (slot.get("name"), slot.get("terminalKind")) == ("slot[2]", "org.koppel.port.slot")
-    wanted = {m: f"P.slot[2].{m}" for m in MEMBERS if m[0] in "FM"}
+    in_space = PLANAR_MEMBERS if name in PLANAR else MEMBERS
+    wanted = {m: f"{port}.slot[2].{m}" for m in in_space if m[0] in "FM"}
     assert members(slot) == wanted
 
 

@@ -7,7 +7,7 @@ import closed_forms
 import numpy as np
 import pytest
 from koppel import Reference, Result, paths
-from koppel.reference_results import run, shaken
+from koppel.reference_results import run, shaken, shaken_axis, shaken_handle
 from oracle.element import Element, Strut, by_hinge
 from scipy.integrate import solve_ivp
 
@@ -208,6 +208,200 @@ def test_primary_oscillator(packed):
     _, fine = closed_forms.resonance(at)
     heat = np.trapezoid(c * fine * fine, at)
     assert result["energy.dissipated"][-1] == pytest.approx(heat, rel=1e-7)
+
+
+def test_effi_plant(packed):
+    """The unpowered device on its friction: mass matrix and potential as functions of the handle, their derivatives by complex
+    steps, scipy's Radau. 1e-6: the bristles' rate is stiff, both integrations stop at 1e-10."""
+    result = packed("effi_plant")
+    pivots, m_H, m_rod, com, m_h, com_h = np.array([[-0.35, 0.0], [0.35, 0.0]]), 2.0, 3.0, 0.25, 8.0, 0.15
+    m_l = m_rod + 1e-4 * (2.0 * np.pi / 0.01) ** 2
+    length = lambda H: np.sqrt(((H - pivots) ** 2).sum(axis=1))
+
+    def inertia(H):
+        total = m_H * np.eye(2, dtype=complex)
+        for l, d in zip(length(H), H - pivots):
+            u = d / l
+            t = np.array([-u[1], u[0]])
+            I = 0.35 + 0.0625 + m_rod * (l - com) ** 2
+            total = total + m_l * np.outer(u, u) + I / l**2 * np.outer(t, t)
+        return total
+
+    def potential(H):
+        heights = [d[1] / l * (m_rod * (l - com) + m_h * com_h) for l, d in zip(length(H), H - pivots)]
+        return 9.81 * (m_H * H[1] + sum(heights))
+
+    def slope(f, H):
+        steps = 1e-30j * np.eye(2)
+        return [np.imag(f(H + step)) / 1e-30 for step in steps]
+
+    def friction(v, z):
+        g = 60.0 + 30.0 * np.exp(-((v / 0.005) ** 2))
+        z_dot = v - 2e6 * np.abs(v) * z / g
+        return 2e6 * z + 5000.0 * np.exp(-((v / 0.005) ** 2)) * z_dot + 300.0 * v, z_dot
+
+    def rhs(_, x):
+        H, v, z = x[:2], x[2:4], x[4:6]
+        J = (H - pivots) / length(H)[:, None]
+        F, z_dot = friction(J @ v, z)
+        by_x, by_z = slope(inertia, H)
+        rate = by_x * v[0] + by_z * v[1]
+        quadratic = np.array([0.5 * v @ by_x @ v, 0.5 * v @ by_z @ v])
+        Q = -(J.T @ F) - np.array(slope(potential, H)) - rate @ v + quadratic
+        heat = F @ (J @ v) - 2e6 * z @ z_dot
+        return np.concatenate([v, np.linalg.solve(inertia(H).real, Q), z_dot, [heat]])
+
+    start = [0.0, 0.6, 0.0, 0.0, 0.0, 0.0, 0.0]
+    scale = {"rtol": 1e-10, "atol": [1e-13] * 4 + [1e-16] * 2 + [1e-12]}
+    path = solve_ivp(rhs, (0.0, result.t[-1]), start, t_eval=result.t, method="Radau", **scale).y
+    moving = lambda of: np.array([of(x[:2], x[2:4], x[4:6]) for x in path.T]).T
+    l_dot = moving(lambda H, v, z: ((H - pivots) / length(H)[:, None]) @ v)
+    F_fr = friction(l_dot, path[4:6])[0]
+    kinetic = moving(lambda H, v, z: 0.5 * v @ inertia(H).real @ v)
+    stored = moving(lambda H, v, z: np.real(potential(H)) + 1e6 * z @ z)
+    expected = {
+        "H.r.z": path[1], "H.v.z": path[3], "axis[1].bristle": path[4], "axis[2].bristle": path[5],
+        "axis[1].velocity": l_dot[0], "axis[2].velocity": l_dot[1],
+        "axis[1].friction": F_fr[0], "axis[2].friction": F_fr[1],
+        "energy.kinetic": kinetic, "energy.potential": stored, "energy.dissipated": path[6],
+        "jacobian.determinant": moving(lambda H, v, z: 2.0 * 0.35 * H[1] / (0.35**2 + H[1] ** 2)),
+        "H.a.z": np.array([rhs(0.0, x)[3] for x in path.T]),
+    }  # fmt: skip
+    left_out = compare(result, expected, 1e-5)
+    assert set(left_out) == {"axis[1].position", "axis[2].position"}
+    for i in (1, 2):
+        exact = moving(lambda H, v, z: length(H)[i - 1])
+        assert np.abs(result[f"axis[{i}].position"] - exact).max() <= 0.51e-6, "half the encoder's resolution"
+
+
+def test_effi_controller(packed):
+    """The law of a tick in numpy: filter, pose, damped inverse is not reached, axis law, queue of one."""
+    result = packed("effi_controller")
+    T, offset, pivots = 1e-3, np.array([-0.07, 0.55]), np.array([[-0.35, 0.0], [0.35, 0.0]])
+    beta, rate, last, queue = 1.0 - np.exp(-2.0 * np.pi * 0.2), np.zeros(2), None, np.zeros(2)
+    wanted = np.sqrt(((offset - pivots) ** 2).sum(axis=1))
+    seen = {}
+    for k in range(1000):
+        l = np.array([*shaken_axis(k * T), np.hypot(0.35, 0.6)])
+        if last is not None:
+            rate = rate + beta * ((l - last) / T - rate)
+        last = l
+        xi = (l[0] ** 2 - l[1] ** 2 + 0.49) / 1.4
+        r = np.array([-0.35 + xi, np.sqrt(l[0] ** 2 - xi**2)])
+        u = (r - pivots) / l[:, None]
+        t = np.column_stack([-u[:, 1], u[:, 0]])
+        weight = 9.81 * np.array([0.0, 2.0])
+        for i in range(2):
+            weight = weight + 9.81 * (3.0 * u[i, 1] * u[i] + (3.0 * (l[i] - 0.25) + 1.2) * t[i, 1] / l[i] * t[i])
+        f = np.linalg.solve(u.T, weight) + 3e5 * (wanted - l) - 6000.0 * rate
+        queue, command = np.clip(f, -2500.0, 2500.0), queue
+        seen[k] = (*command, *r, *np.linalg.solve(u, rate))
+    # a row shows the tick before its time: the one at its time waits for the next step
+    rows = np.array([seen[round(t / T) - 1] for t in result.t[1:]])
+    names = ["axis[1].force_command", "axis[2].force_command", "V.r.x", "V.r.z", "V.v.x", "V.v.z"]
+    for name, column in zip(names, rows.T):
+        assert np.abs(result[name][1:] - column).max() <= 1e-9 * np.abs(column).max(), name
+    still = [n for n in result.names if n not in names and np.abs(result[n]).max() > 0.0]
+    assert still == []
+
+
+def test_virtual_wall(packed):
+    """Closed form of a spring that is met without damping."""
+    result = packed("virtual_wall")
+    depth = 2e-3 * np.sin(20.0 * result.t)
+    F, stored = 2e4 * np.maximum(depth, 0.0), 1e4 * np.maximum(depth, 0.0) ** 2
+    expected = {
+        "A.F.z": F, "A.F0.z": F, "penetration": depth, "energy.potential": stored,
+        "energy.supplied": stored, "energy.port": stored,
+    }  # fmt: skip
+    # the kink at contact is met by the step control only
+    assert compare(result, expected, 1e-6) in ([], ["energy.dissipated"])
+    assert np.abs(result["energy.dissipated"]).max() < 1e-8
+
+
+def test_operator_arm(packed):
+    """The hand on arm and grip, whose handle is shaken."""
+    result = packed("operator_arm")
+
+    def rhs(t, x):
+        r, v = shaken_handle(t)
+        F = 3000.0 * (x[0] - r) + 30.0 * (x[1] - v)
+        a = (-F - 300.0 * (x[0] - 0.6) - 15.0 * x[1]) / 1.5
+        return [x[1], a, 15.0 * x[1] ** 2 + 30.0 * (x[1] - v) ** 2, -F * v]
+
+    z, v, heat, work = solve_ivp(rhs, (0.0, 1.0), [0.6, 0.0, 0.0, 0.0], t_eval=result.t, **TIGHT).y
+    r, v_H = (np.array(column) for column in zip(*map(shaken_handle, result.t)))
+    F = 3000.0 * (z - r) + 30.0 * (v - v_H)
+    expected = {
+        "hand.r.z": z, "hand.v.z": v, "H.F.z": F, "H.F0.z": F, "energy.kinetic": 0.75 * v * v,
+        "energy.potential": 150.0 * (z - 0.6) ** 2 + 1500.0 * (z - r) ** 2,
+        "energy.dissipated": heat, "energy.supplied": work, "energy.port": work,
+    }  # fmt: skip
+    assert compare(result, expected, 1e-6) == []
+
+
+def test_virtual_mechanism(packed):
+    """The flap by its energies: points of the four-bar by circles, all derivatives by complex steps, scipy's DOP853."""
+    result = packed("virtual_mechanism")
+    O2, a, b, c = np.array([0.0, 0.1]), 0.25, 0.12, 0.25
+
+    def places(phi):
+        """Coupler's centre, hand, gas joint and the angles of coupler and rocker."""
+        P = a * np.array([np.cos(phi), np.sin(phi)])
+        e = O2 - P
+        L2 = e @ e
+        along = (b * b - c * c + L2) / (2.0 * L2)
+        across = np.sqrt(b * b / L2 - along * along)
+        Q = P + along * e + across * np.array([-e[1], e[0]])
+        t = (Q - P) / b
+        n = np.array([-t[1], t[0]])
+        at = lambda x, z: P + x * t + z * n
+        return at(0.05, -0.15), at(0.05, -0.35), P, Q, t
+
+    def rates(phi):
+        """Derivatives by the crank angle of the coupler's centre and the angles of coupler and rocker."""
+        h = 1e-30
+        C, _, P, Q, t = (np.imag(p) / h for p in places(phi + 1j * h))
+        (_, _, _, q, direction) = (np.real(p) for p in places(phi))
+        rocker = q - O2
+        return C, t @ np.array([-direction[1], direction[0]]), (rocker[0] * Q[1] - rocker[1] * Q[0]) / c**2
+
+    def inertia(phi):
+        C, psi, chi = rates(phi)
+        return 0.02 + 4.0 * C @ C + 0.12 * psi**2 + 0.02 * chi**2
+
+    def potential(phi):
+        C, _, P, _, _ = places(phi)
+        strut = P - np.array([0.05, -0.15])
+        return 4.0 * 9.81 * C[1] - 125.0 * np.sqrt(strut @ strut) - 0.6 * np.exp(-(((phi - 0.3) / 0.05) ** 2))
+
+    def stop(phi, rate):
+        p, sign = (phi - 0.8, 1.0) if phi > 0.8 else (-0.9 - phi, -1.0)
+        if p <= 0.0:
+            return 0.0, 0.0
+        return -sign * 2000.0 * p * max(0.0, 1.0 + sign * rate), 1000.0 * p * p
+
+    def rhs(_, x):
+        phi, rate = x
+        V_1 = np.imag(potential(phi + 1e-30j)) / 1e-30
+        h = 1e-4
+        # fourth-order difference of M, exact to 1e-12
+        M_1 = (8.0 * (inertia(phi + h) - inertia(phi - h)) - inertia(phi + 2 * h) + inertia(phi - 2 * h)) / (12.0 * h)
+        friction = 0.4 * rate + 0.2 * np.tanh(rate / 0.02)
+        return [rate, (stop(phi, rate)[0] - M_1 * rate**2 / 2.0 - V_1 - friction) / inertia(phi)]
+
+    tight = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
+    phi, rate = solve_ivp(rhs, (0.0, result.t[-1]), [-0.3, 0.0], t_eval=result.t, **tight).y
+    hand = np.array([places(p)[1] for p in phi]).T
+    expected = {
+        "phi": phi, "phi_rate": rate, "H.r.x": hand[0], "H.r.z": hand[1],
+        "energy.kinetic": [0.5 * inertia(p) * v * v for p, v in zip(phi, rate)],
+        "energy.potential": [potential(p) + stop(p, 0.0)[1] for p in phi],
+    }  # fmt: skip
+    left_out = compare(result, {name: np.asarray(column) for name, column in expected.items()}, 1e-6)
+    assert set(left_out) == {"H.v.x", "H.v.z", "H.a.x", "H.a.z", "energy.dissipated"}
+    balance = result["energy.dissipated"] + expected["energy.kinetic"] + expected["energy.potential"]
+    assert np.abs(balance - balance[0]).max() <= 1e-6 * np.ptp(expected["energy.potential"])
 
 
 def test_rvdp_absorber(packed):

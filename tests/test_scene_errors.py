@@ -90,6 +90,7 @@ def test_slots_are_filled_in_order_until_none_is_left(scene):
 RUNS = {
     "no step": ({"integrator": "rk4"}, r"rk4 needs a step"),
     "no H": ({"method": "jacobi"}, r"jacobi needs a communication step H"),
+    "no corrector": ({"method": "cs-predict"}, r"cs-predict needs a communication step H"),
     "H": ({"method": "cs-predict", "H": 0.03}, r"H = 0.03 s does not divide the distance of the samples, 0.01 s"),
     "interval": ({"interval": 0.3, "H": 0.1, "method": "jacobi"}, r"interval = 0.3 s does not divide 2 s"),
     "stop": ({"stop": 0.0}, r"stop = 0.0: must be after start"),

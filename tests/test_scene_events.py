@@ -91,7 +91,14 @@ def bounce_times(count):
 
 
 @pytest.mark.parametrize(
-    ("integrator", "step", "limit"), [("heun", 0.05, 1e-11), ("rk4", 0.05, 1e-11), ("dopri5", None, 1e-10)]
+    ("integrator", "step", "limit"),
+    [
+        ("heun", 0.05, 1e-11),
+        ("rk4", 0.05, 1e-11),
+        ("dopri5", None, 1e-10),
+        ("rodas4", None, 1e-10),
+        ("radau5", None, 1e-10),
+    ],
 )
 def test_state_events_are_located(integrator, step, limit):
     """Parabolas are exact for every method, so bounces are met to the accuracy of their location."""

@@ -14,6 +14,8 @@ from serialised import METHODS, WAYS, go_on, open_instance, tunable
 NAMES = sorted(folder.parent.name for folder in (paths.ROOT / "fmus").glob("*/Cargo.toml"))
 each_fmu = pytest.mark.parametrize("name", NAMES)
 BEFORE, AFTER = 7, 12
+#: What Model Exchange needs for the midpoint rule at 10 ms: bristles of friction are a hundred times as fast.
+SLOW = {"effi_plant": {"friction.model": "viscous"}}
 
 
 def in_another_process(fmu, way, data, folder):
@@ -47,7 +49,7 @@ def test_another_process_goes_on_to_the_last_bit(fmu, name, way, tmp_path):
     one = fmu(name)
     if way == "me" and one.description.modelExchange is None:
         pytest.skip("Co-Simulation only")
-    data, expected = cut(one, way, {})
+    data, expected = cut(one, way, SLOW.get(name, {}) if way == "me" else {})
     there = in_another_process(one, way, data, tmp_path)
     assert np.ptp(expected, axis=0).max() > 0.0, "nothing moves"
     assert there.tobytes() == expected.tobytes()

@@ -4,8 +4,9 @@ with library.scene("double_wishbone") as scene:
     scene.run(integrator="rk4", step=0.05)
 """
 
-from collections.abc import Callable
-from math import pi
+from cmath import exp, phase
+from collections.abc import Callable, Mapping
+from math import acos, pi
 
 from .fmu import Value
 from .scene import Scene
@@ -160,6 +161,124 @@ def _tuned(absorber: str, mass: float, omega: float) -> dict[str, Value]:
     return {**at_rest, "stiffness": mass * own**2, "damping": 2.0 * zeta * mass * own}
 
 
+def haptic_wall(scene: Scene, stiffness: float = 2e4, arm: bool = True, **wall: Value):
+    """An arm pushes the handle of the haptic interface through a virtual wall at z = 0.57, rendered by impedance.
+
+    `arm`: False leaves the handle to itself. `wall`: further parameters of the wall.
+    """
+    start: dict[str, Value] = {"x": 0.0, "z": 0.575}
+    velocity: dict[str, Value] = {"v.x": 0.05, "v.z": -0.15}
+    plain: dict[str, Value] = {"friction.model": "viscous", "use.encoder": False}
+    scene.add("controller", "effi_controller", mode="impedance")
+    scene.add("plant", "effi_plant", **_prefixed("H.start", start | velocity), **plain)
+    scene.add("wall", "virtual_wall", stiffness=stiffness, **wall)
+    _device(scene)
+    scene.connect("controller.V", "wall.A")
+    scene.record(*_HANDLE, *_COMMANDS, "wall.A.F.z", "controller.energy.rendered", interval=0.005)
+    if arm:
+        end: dict[str, Value] = {"x": 0.08, "z": 0.5}
+        _arm(scene, start, end)
+        scene.set("arm", **_prefixed("start", velocity))
+        scene.connect("plant.H", "arm.H")
+        scene.record("arm.H.F.x", "arm.H.F.z")
+    scene.configure(method="cs-predict", H=1e-3, stop=0.6)
+    scene.reference = "extra/effi/loop_wall.csv"
+
+
+#: Variants of the mechanism: its parameters, coordinate, and start and end of the movement.
+_RENDERED: dict[str, tuple[dict[str, Value], str, float, float]] = {
+    "flap": ({"gas.force": 20.0}, "phi", -0.3, 0.2),
+    "drawer": ({"kind": "drawer", "drawer.start.x": -0.05, "drawer.start.z": 0.1}, "drawer.s", 0.0, 0.25),
+}
+
+
+def haptic_mechanism(
+    scene: Scene, kind: str = "flap", direct: bool = False, cycle: bool = False, **values: Value
+):
+    """An arm opens a flap or drawer that the haptic interface renders by admittance.
+
+    `direct`: the arm holds the mechanism itself, for comparison. `cycle`: it closes it as well, 2 s each. `values`:
+    further parameters of the mechanism.
+    """
+    own, coordinate, first, last = _RENDERED[kind]
+    scene.add("mechanism", "virtual_mechanism", **{**own, **values})
+    scene.set("mechanism", **{f"{coordinate}.start": first})
+    # where the hand is at both ends; the device works about its own centre
+    shift = (0.0, 0.0) if direct else _OFFSET
+    ends = [_hand(scene.component("mechanism"), kind, q) for q in (first, last)]
+    start, end = ({"x": x + shift[0], "z": z + shift[1]} for x, z in ends)
+    _arm(scene, start, end, **{"grip.stiffness": 1000.0, "intent.duration": 2.0})
+    if cycle:
+        _there_and_back(scene, start, end, 4.0)
+    if direct:
+        scene.connect("mechanism.H", "arm.H")
+    else:
+        about: dict[str, Value] = {"offset.x": _OFFSET[0], "offset.z": _OFFSET[1]}
+        balanced: dict[str, Value] = {"start.balanced": True}
+        scene.add("controller", "effi_controller", **balanced, **about)
+        scene.add("plant", "effi_plant", **balanced, **{"use.encoder": False}, **_prefixed("H.start", start))
+        _device(scene)
+        scene.connect("plant.H", "arm.H")
+        scene.connect("mechanism.H", "controller.W")
+        scene.record(*_HANDLE, *_COMMANDS, "plant.sensor.F.x", "plant.sensor.F.z", "plant.axis[1].position")
+        scene.record("plant.axis[2].position", interval=0.01)
+    names = ["mechanism.H.r.x", "mechanism.H.r.z", "mechanism.H.v.x", "mechanism.H.v.z", f"mechanism.{coordinate}"]
+    scene.record(*names, "mechanism.energy.port", "arm.H.F.x", "arm.H.F.z", interval=0.01)
+    scene.configure(method="cs-predict", H=1e-3, stop=3.0)
+    scene.reference = None if direct or cycle or kind != "flap" or values else "extra/effi/haptic_mechanism.csv"
+
+
+#: Where the device puts the origin of the mechanism [m].
+_OFFSET = (-0.07, 0.55)
+_HANDLE = tuple(f"plant.H.{part}.{i}" for part in "rv" for i in "xz")
+_COMMANDS = tuple(f"controller.axis[{i}].force_command" for i in (1, 2))
+
+
+def _prefixed(prefix: str, values: Mapping[str, Value]) -> dict[str, Value]:
+    return {f"{prefix}.{name}": value for name, value in values.items()}
+
+
+def _arm(scene: Scene, start: Mapping[str, Value], end: Mapping[str, Value], **values: Value):
+    """An operator who holds the handle at `start` and means to move it to `end`."""
+    at = {f"{name}.{i}": place[i] for name, place in (("start.r", start), ("intent.start.r", start)) for i in "xz"}
+    scene.add("arm", "operator_arm", **at, **_prefixed("intent.end.r", end), **values)
+
+
+def _there_and_back(scene: Scene, start: dict[str, float], end: dict[str, float], period: float):
+    """The operator means to move to `end` and back again."""
+    swing: dict[str, Value] = {"kind.y": "rest"}
+    for i in "xz":
+        middle, half = 0.5 * (start[i] + end[i]), 0.5 * (end[i] - start[i])
+        swing |= {f"kind.{i}": "sine", f"start.{i}": middle, f"amplitude.{i}": half}
+        swing |= {f"omega.{i}": 2.0 * pi / period, f"phase.{i}": -0.5 * pi}
+    scene.add("intention", "guide", **swing)
+    scene.set("arm", **{"intent.kind": "input"})
+    for quantity in ("r.x", "r.z", "v.x", "v.z"):
+        scene.connect_signal(f"intention.P.{quantity}", f"arm.intent.{quantity}")
+
+
+def _device(scene: Scene):
+    """Encoders and force sensor to the controller, its commands to the drives."""
+    for i in (1, 2):
+        scene.connect_signal(f"plant.axis[{i}].position", f"controller.axis[{i}].position")
+        scene.connect_signal(f"controller.axis[{i}].force_command", f"plant.axis[{i}].force_command")
+    for i in "xz":
+        scene.connect_signal(f"plant.sensor.F.{i}", f"controller.sensor.F.{i}")
+
+
+def _hand(mechanism, kind: str, q: float) -> tuple[float, float]:
+    """Where the hand holds the mechanism at a coordinate."""
+    of = lambda name: float(mechanism.value(name))
+    if kind == "drawer":
+        return of("drawer.start.x") + q * of("drawer.direction.x"), of("drawer.start.z") + q * of("drawer.direction.z")
+    P = complex(of("O1.x"), of("O1.z")) + of("crank.length") * exp(1j * q)
+    e = complex(of("O2.x"), of("O2.z")) - P
+    b, c = of("coupler.length"), of("rocker.length")
+    psi = phase(e) + of("branch") * acos((b * b + abs(e) ** 2 - c * c) / (2.0 * b * abs(e)))
+    H = P + complex(of("hand.x"), of("hand.z")) * exp(1j * psi)
+    return H.real, H.imag
+
+
 def _wishbone_run(scene: Scene, reference: str):
     names = [*_angles("lower"), "carrier.angle.psi", "carrier.angle_rate.psi", *_angles("upper")]
     scene.record(*names, "carrier.P.r.x", "carrier.P.r.z", interval=0.05)
@@ -180,6 +299,8 @@ SCENES: dict[str, Callable[..., None]] = {
         double_wishbone,
         double_wishbone_two_chain,
         absorber_on_oscillator,
+        haptic_wall,
+        haptic_mechanism,
     )
 }
 

@@ -1,10 +1,13 @@
 """Error against run time of the library's scenes.
 
 python -m koppel.scene_study [NAME...]            out/<scene>/work_precision.csv and the plots
-python -m koppel.scene_study --keep [NAME...]     tests/reference/regression/<scene>.json, errors and counts only
+python -m koppel.scene_study --keep [NAME...]     tests/reference/regression/<scene>.json, and native/<scene>.json there by
+                                                  the program koppel: errors and counts only
 """
 
 import argparse
+import json
+import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,8 +32,12 @@ class Plan:
 
 
 _SMALL = Plan((10e-3, 5e-3, 2.5e-3, 1e-3, 0.5e-3, 0.1e-3), (10e-3, 5e-3, 2.5e-3))
+#: A sampled controller: communication points at its ticks, and between them for arm and plant.
+_SAMPLED = tuple(method for method in METHODS if method.name == "cs predict")
 PLANS = {
     "absorber_on_oscillator": Plan((10e-3, 5e-3, 2e-3, 1e-3, 0.5e-3), (10e-3, 5e-3, 2e-3), kept_stop=5.0),
+    "haptic_wall": Plan((0.5e-3, 0.25e-3, 0.125e-3, 0.0625e-3), (0.5e-3, 0.25e-3), methods=_SAMPLED, kept_stop=0.2),
+    "haptic_mechanism": Plan((0.2e-3, 0.1e-3, 0.05e-3), (0.2e-3, 0.1e-3), methods=_SAMPLED, kept_stop=0.2),
     "two_mass": _SMALL,
     "double_pendulum": _SMALL,
     "four_bar": Plan((15e-3, 7.5e-3, 3.75e-3, 1.5e-3, 0.75e-3, 0.15e-3), (15e-3, 7.5e-3, 3.75e-3)),
@@ -48,6 +55,39 @@ def kept(name: str, fmus=None) -> list[Point]:
     with library.scene(name, fmus) as scene:
         scene.configure(stop=plan.kept_stop)
         return scene.study(steps=plan.kept_steps, methods=methods, repeat=0)
+
+
+def kept_native(name: str) -> list[Point]:
+    """The same of `koppel study`, whose steps are parts of the sample interval; without adaptive methods, too."""
+    stop = [] if PLANS[name].kept_stop is None else ["--stop", str(PLANS[name].kept_stop)]
+    command = [paths.DIST / "bin" / "koppel", "study", paths.ROOT / "scenes" / name, "--runs", "0", "--json", *stop]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=paths.ROOT, timeout=600)
+    if done.returncode != 0:
+        raise SceneError(f"koppel study {name}: {done.stderr.strip()}")
+    only_common = all(method.settings["method"] == "common" for method in PLANS[name].methods)
+    points = [point for point in json.loads(done.stdout)["points"] if point["H"] is not None]
+    return [_native_point(name, p) for p in points if not only_common or p["method"].startswith("common")]
+
+
+def _native_point(scene: str, point: dict) -> Point:
+    counts = {}
+    if cost := point["cost"]:
+        steps, calls = cost["steps"], cost["calls"]
+        counts = {
+            "steps": steps["accepted"],
+            "rejected": steps["rejected"],
+            "evaluations": point["evaluations"],
+            "sweeps": cost["sweeps"],
+            "calls": sum(calls.values()),
+            "Get": calls["get"],
+            "Set": calls["set"],
+            "doStep": calls["do_step"],
+            "save": calls["save"],
+            "restore": calls["restore"],
+        }
+    same = ("method", "H", "rtol", "e_max", "e_rms", "energy", "gap", "wall_min", "wall_median", "cpu")
+    taken = {name: point[name] for name in (*same, "real_time_factor", "order", "status")}
+    return Point(scene=scene, counts={kind: n for kind, n in counts.items() if n}, **taken)
 
 
 def whole(name: str, repeat: int) -> list[Point]:
@@ -80,9 +120,9 @@ def main(arguments: Sequence[str] | None = None):
         if name not in PLANS:
             parser.error(f"no scene {name}; there are: {', '.join(PLANS)}")
         if options.keep:
-            path = REGRESSION / f"{name}.json"
-            study.write_regression(kept(name), path)
-            print(f"written: {path.relative_to(paths.ROOT)}")
+            for path, points in ((REGRESSION, kept(name)), (REGRESSION / "native", kept_native(name))):
+                study.write_regression(points, path / f"{name}.json")
+                print(f"written: {(path / name).relative_to(paths.ROOT)}.json")
         else:
             whole(name, options.repeat)
 

@@ -52,10 +52,12 @@ impl<M: Model> Instance<M> {
         self.tuned()?;
         let State { values, model, x, discrete, crossed, fresh, solver, .. } = &mut self.state;
         let (t, u) = (values[0], &values[Layout::<M>::INPUTS]);
+        let before = *discrete;
         let Updated { changed, states, again, next } = match model {
             Some(model) => model.with_system(Update { t, crossed: *crossed, u, x, d: discrete })?,
             None => Updated { changed: false, states: false, again: false, next: None },
         };
+        self.warnings.extend(M::notice(&before, discrete));
         *crossed = false;
         if changed {
             *fresh = 0;

@@ -46,6 +46,8 @@ pub trait Exported: Sized {
     fn break_down(&mut self);
     /// Name of a type in the standard that the instance speaks.
     fn type_name(&self, kind: Kind) -> &'static str;
+    /// True if the last call has left messages.
+    fn has_warnings(&self) -> bool;
     /// Messages of the last call about things that are allowed but probably not meant.
     fn take_warnings(&mut self) -> Vec<String>;
     /// Where the instance stands [s].
@@ -185,6 +187,7 @@ impl<M: Model> Exported for Instance<M> {
     own! {
         fn enter(&self, rule: &Rule) -> Result<(), Fault>;
         fn type_name(&self, kind: Kind) -> &'static str;
+        fn has_warnings(&self) -> bool;
         fn time(&self) -> f64;
         fn dependencies(&self, reference: u32) -> Result<Vec<usize>, Fault>;
         fn serialise(&self, saved: &Self::State) -> Result<Vec<u8>, Fault>;

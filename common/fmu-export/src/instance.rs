@@ -70,6 +70,12 @@ impl<M: Model> Instance<M> {
         Table::shared::<M>().token()
     }
 
+    /// True if the last call has left messages.
+    #[must_use]
+    pub fn has_warnings(&self) -> bool {
+        !self.warnings.is_empty()
+    }
+
     /// Messages of the last call about things that are allowed but probably not meant.
     pub fn take_warnings(&mut self) -> Vec<String> {
         std::mem::take(&mut self.warnings)

@@ -186,10 +186,13 @@ impl<M: Model> Visitor<M> for Update<'_, M> {
             }
         }
         let mut d = *self.d;
-        let event = system.next_event(&d).filter(|event| due(*event, self.t));
+        let slack = slack(system);
+        let event = system.next_event(&d).filter(|event| due(*event, self.t, slack));
+        let u = M::Inputs::<f64>::load(self.u);
         if self.crossed || event.is_some() {
-            let t = event.map_or(self.t, |event| event.max(self.t));
-            d = system.update(t, &mut x, &M::Inputs::<f64>::load(self.u), &d);
+            d = system.update(event.map_or(self.t, |event| event.max(self.t)), &mut x, &u, &d);
+        } else {
+            d = system.revise(self.t, &mut x, &u, &d);
         }
         if let Some(i) = not_finite(&x) {
             let variable = system.state_names()[i].clone();
@@ -197,10 +200,11 @@ impl<M: Model> Visitor<M> for Update<'_, M> {
         }
         let states = x.map(f64::to_bits) != before.map(f64::to_bits);
         let changed = states || d != *self.d;
+        let next = system.next_event(&d);
+        let again = next.is_some_and(|event| due(event, self.t, slack)) || system.awaits_answer(self.d, &d);
         self.x.copy_from_slice(&x);
         *self.d = d;
-        let next = system.next_event(&d);
-        Ok(Updated { changed, states, again: next.is_some_and(|event| due(event, self.t)), next })
+        Ok(Updated { changed, states, again, next })
     }
 }
 
@@ -210,6 +214,14 @@ fn not_finite<const N: usize>(x: &[f64; N]) -> Option<usize> {
 }
 
 /// True if the time of an event has come.
-fn due(event: f64, t: f64) -> bool {
-    event <= t + 4.0 * f64::EPSILON * t.abs()
+fn due(event: f64, t: f64, slack: f64) -> bool {
+    event <= t + slack + 4.0 * f64::EPSILON * t.abs()
+}
+
+/// Part of a sample period by which the times of hosts may miss it.
+const SAME_SAMPLE: f64 = 1e-6;
+
+/// How far before its time an event is due, and after it not yet passed.
+fn slack<const N: usize, const Z: usize>(system: &impl System<N, Z>) -> f64 {
+    system.sample_period().map_or(0.0, |period| SAME_SAMPLE * period)
 }

@@ -34,10 +34,11 @@ pub struct Profile<'a> {
     pub reference_method: &'static str,
 }
 
-/// `dop853`, or `dopri5` where that is not on offer.
+/// `dop853`, where that is not on offer `dopri5`, otherwise the first one.
 fn reference_method(offered: &[i64]) -> &'static str {
-    let best = SolverMethod::Dop853 as i64;
-    method_name(if offered.contains(&best) { best } else { SolverMethod::Dopri5 as i64 })
+    let wanted = [SolverMethod::Dop853 as i64, SolverMethod::Dopri5 as i64];
+    let best = wanted.into_iter().find(|method| offered.contains(method));
+    best.or(offered.first().copied()).map_or("", method_name)
 }
 
 impl Profile<'static> {

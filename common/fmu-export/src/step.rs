@@ -105,8 +105,8 @@ impl<M: Model> Instance<M> {
         };
         let h = solver.settings().inner_step(step);
         let fixed = !solver.settings().method.is_adaptive();
-        let leave_events = *interface == Interface::CoSimulationWithEvents;
         let before = *discrete;
+        let leave_events = *interface == Interface::CoSimulationWithEvents;
         let event = model.with_system(Step {
             from,
             to,
@@ -123,8 +123,8 @@ impl<M: Model> Instance<M> {
             statistics,
             linear: &mut self.linear,
         })?;
-        *guarded = h;
         self.warnings.extend(M::notice(&before, discrete));
+        *guarded = h;
         SolverCounters::from(*statistics).store(&mut values[Layout::<M>::COUNTERS]);
         if let [jacobians] = &mut values[Layout::<M>::AUTO_COUNTERS] {
             AutoCounters { jacobians: statistics.jacobians }.store(std::slice::from_mut(jacobians));

@@ -279,7 +279,9 @@ impl Table {
     #[must_use]
     pub fn dependencies(&self, unknown: usize) -> Vec<usize> {
         let depends = self.variables[unknown].entry.depends;
-        let component = self.variables[unknown].name.rsplit('.').next().unwrap_or_default();
+        // of a time derivative: that of its state
+        let component =
+            self.variables[unknown].name.trim_end_matches(')').rsplit('.').next().unwrap_or_default();
         let covers = |name: &str| {
             depends.iter().any(|d| {
                 if let Some(alone) = d.strip_prefix('=') {

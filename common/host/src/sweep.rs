@@ -2,6 +2,7 @@
 
 mod driven;
 mod ports;
+mod response;
 
 pub use driven::Driven;
 pub(crate) use driven::SweepState;
@@ -13,6 +14,7 @@ use crate::closure::Closure;
 use crate::error::RunError;
 use crate::import::{Counts, Fault, Instance};
 use crate::scene::{Axis, Network, Plan, Step};
+use response::Response;
 
 /// No index.
 const NONE: usize = usize::MAX;
@@ -87,6 +89,8 @@ pub struct Sweeper {
     inputs: Vec<Input>,
     /// What the FMUs hold; NaN: not known
     held: Vec<f64>,
+    /// Of components without Event Mode, between steps
+    responses: Vec<Option<Response>>,
     base: Vec<Call>,
     probes: Vec<Probe>,
     last: Vec<Call>,
@@ -169,6 +173,7 @@ impl Sweeper {
             bounds: network.signals.iter().map(|s| ports::RUN_AWAY * s.nominal).collect(),
             joint_of: network.joints.iter().flat_map(joint_name).collect(),
             held: vec![f64::NAN; inputs.len()],
+            responses: instances.iter().map(|_| None).collect(),
             inputs,
             base: compile(network, &plan.base),
             probes: plan.probes.iter().map(probe).collect(),
@@ -255,6 +260,9 @@ impl Sweeper {
     /// Sets what has changed, then reads.
     #[inline]
     fn call(&mut self, call: &Call) -> Result<(), RunError> {
+        if self.answered(call) {
+            return Ok(());
+        }
         self.references.clear();
         self.scratch.clear();
         for &sink in &call.sinks {

@@ -159,7 +159,7 @@ fn settings_out_of_range() {
         &message(&Choices { method: Some("magic".into()), ..base.clone() }),
         &["\"magic\"", "common, cs-predict"],
     );
-    says(&message(&Choices { integrator: Some("radau5".into()), ..base.clone() }), &["radau5", "heun, rk4"]);
+    says(&message(&Choices { integrator: Some("rk5".into()), ..base.clone() }), &["rk5", "heun, rk4"]);
     says(&message(&Choices { step: Some(0.0), ..base.clone() }), &["step", "0", "greater than 0"]);
     says(&message(&Choices { rtol: Some(f64::NAN), ..base.clone() }), &["rtol", "NaN"]);
     says(&message(&Choices { stop: Some(-1.0), ..base.clone() }), &["stop must come after start"]);

@@ -11,7 +11,7 @@ use crate::solver::Memory;
 use crate::{Dense, Ode, StepError};
 
 /// Part of a step that is tried next where the equations of an implicit step had no solution.
-const HALF: f64 = 0.5;
+pub(crate) const HALF: f64 = 0.5;
 
 /// Runs to `t_end` and leaves in `memory` what the next call starts with.
 #[inline]

@@ -19,8 +19,8 @@
 //! R. H. C. Takahashi, ACM TOMS 47 (2020) (root finder). Left out: integration backwards in time, multistep methods,
 //! sparse matrices.
 //!
-//! Where the number of states is known only at run time, [`ExplicitSolver`] takes the same steps one by one; it allocates when
-//! it is made.
+//! Where the number of states is known only at run time, [`DynamicSolver`] takes the same steps one by one. It allocates when it
+//! is made, and for Rodas4 and Radau5 in every step; their Jacobians are differences of the right-hand side.
 //!
 //! ```
 //! use integrators::{Method, Ode, Settings, Solver, Statistics};
@@ -84,7 +84,7 @@ mod statistics;
 
 pub use complex::Complex;
 pub use dense::Dense;
-pub use dynamic::{DynamicOde, ExplicitSolver, ExplicitState, NotExplicit};
+pub use dynamic::{DynamicOde, DynamicSolver, DynamicState, NoSolver};
 pub use error::{SettingsError, StepError};
 pub use events::{Crossing, Indicators, Reached};
 pub use exact::Transition;

@@ -19,17 +19,88 @@ use crate::one_step::{Call, Estimate, OneStep, Start};
 use crate::pace::Pace;
 use crate::{Complex, Dense, Ode, StepError, stability};
 
-mod system;
+pub(crate) mod system;
 #[cfg(test)]
 mod tests;
 use system::{A, C, Matrices, POWERS, Stages, T, T_INVERSE, times};
 
 /// Most Newton iterations.
-const MOST: u32 = 10;
+pub(crate) const MOST: u32 = 10;
 /// Rate of convergence up to which a Jacobian is used again.
-const REUSE: f64 = 1e-3;
+pub(crate) const REUSE: f64 = 1e-3;
 /// Longest growth that is not worth new matrices.
-const KEEP: f64 = 1.2;
+pub(crate) const KEEP: f64 = 1.2;
+
+/// Its control of the step size.
+pub(crate) const PACE: Pace = Pace { order: 4.0, beta: 0.0, shrink: 0.2, grow: 8.0, predictive: true };
+
+/// The estimate has order 3 and the method 5: its step size goes with `rtol^(1/6)`, its error with `rtol^(5/6)`.
+pub(crate) fn tolerance(rtol: f64) -> f64 {
+    0.1 * rtol.powf(2.0 / 3.0)
+}
+
+/// What the size of an increment says about the Newton iteration.
+pub(crate) enum Verdict {
+    Arrived,
+    GoesOn,
+    /// It diverges, or is too slow to arrive
+    Hopeless,
+}
+
+/// How the Newton iteration converges.
+pub(crate) struct Convergence {
+    /// Increment allowed: a part of the error allowed, above rounding
+    tolerance: f64,
+    /// Rate of convergence
+    pub(crate) rate: f64,
+    /// `rate / (1 - rate)`: error after an iteration over its increment
+    pub(crate) eta: f64,
+    /// Ratio of the last two increments
+    last: f64,
+    /// Increment before
+    before: f64,
+}
+
+impl Convergence {
+    /// Before the first iteration; `eta` of the last step.
+    #[inline]
+    pub(crate) fn new(eta: f64, rtol: f64) -> Self {
+        let tolerance = rtol.sqrt().min(0.03).max(10.0 * f64::EPSILON / rtol);
+        Self { tolerance, rate: 0.0, eta: eta.max(f64::EPSILON).powf(0.8), last: 0.0, before: 0.0 }
+    }
+
+    /// After iteration `k` with an increment of this size.
+    #[inline]
+    pub(crate) fn after(&mut self, k: u32, size: f64) -> Verdict {
+        if !size.is_finite() {
+            return Verdict::Hopeless;
+        }
+        if k > 1 {
+            let ratio = size / self.before;
+            self.rate = if k == 2 { ratio } else { (ratio * self.last).sqrt() };
+            self.last = ratio;
+            if self.rate < 0.99 {
+                self.eta = self.rate / (1.0 - self.rate);
+                // the first ratio tells little of a start far off
+                if k > 2 && self.eta * size * self.rate.powi((MOST - k).cast_signed()) > self.tolerance {
+                    return Verdict::Hopeless;
+                }
+            } else if size > self.tolerance {
+                return Verdict::Hopeless;
+            } else {
+                self.eta = 1.0; // rounding is all that is left
+            }
+        }
+        self.before = size;
+        if self.eta * size <= self.tolerance { Verdict::Arrived } else { Verdict::GoesOn }
+    }
+}
+
+/// Part of the step size that the error allows: less after many iterations.
+pub(crate) fn safety(iterations: u32) -> f64 {
+    let most = f64::from(MOST);
+    0.9 * (2.0 * most + 1.0) / (2.0 * most + f64::from(iterations))
+}
 
 /// The method.
 pub(crate) struct Radau5;
@@ -103,13 +174,9 @@ impl Radau5 {
     ) -> Result<Option<(Stages<N>, u32)>, StepError<O::Error>> {
         let Start { t, x, .. } = from;
         let weights = call.norm.weights(x);
-        let rtol = call.norm.rtol();
-        // a part of the error allowed, above rounding
-        let tolerance = rtol.sqrt().min(0.03).max(10.0 * f64::EPSILON / rtol);
+        let mut convergence = Convergence::new(call.work.eta, call.norm.rtol());
         let mut z = predicted(call.work.before.as_ref(), h);
         let mut w = times(&T_INVERSE, &z);
-        let mut eta = call.work.eta.max(f64::EPSILON).powf(0.8);
-        let (mut rate, mut last, mut before) = (0.0, 0.0, 0.0);
         for k in 1..=MOST {
             let mut f = [[0.0; N]; 3];
             for i in 0..3 {
@@ -122,36 +189,20 @@ impl Radau5 {
             let increment = matrices.increment(&f, &w);
             let square: f64 = increment.iter().map(|d| call.norm.weighted(d, &weights).powi(2)).sum();
             let size = (square / 3.0).sqrt();
-            if !size.is_finite() {
-                return Ok(None);
-            }
             for i in 0..3 {
                 for n in 0..N {
                     w[i][n] += increment[i][n];
                 }
             }
             z = times(&T, &w);
-            if k > 1 {
-                let ratio: f64 = size / before;
-                rate = if k == 2 { ratio } else { (ratio * last).sqrt() };
-                last = ratio;
-                if rate < 0.99 {
-                    eta = rate / (1.0 - rate);
-                    // the first ratio tells little of a start far off
-                    if k > 2 && eta * size * rate.powi((MOST - k).cast_signed()) > tolerance {
-                        return Ok(None); // too slow to arrive
-                    }
-                } else if size > tolerance {
-                    return Ok(None);
-                } else {
-                    eta = 1.0; // rounding is all that is left
+            match convergence.after(k, size) {
+                Verdict::Arrived => {
+                    call.work.rate = convergence.rate;
+                    call.work.eta = convergence.eta;
+                    return Ok(Some((z, k)));
                 }
-            }
-            before = size;
-            if eta * size <= tolerance {
-                call.work.rate = rate;
-                call.work.eta = eta;
-                return Ok(Some((z, k)));
+                Verdict::Hopeless => return Ok(None),
+                Verdict::GoesOn => {}
             }
         }
         Ok(None)
@@ -179,12 +230,11 @@ impl<const N: usize> OneStep<N> for Radau5 {
     type Work = Work<N>;
 
     fn pace(&self) -> Pace {
-        Pace { order: 4.0, beta: 0.0, shrink: 0.2, grow: 8.0, predictive: true }
+        PACE
     }
 
-    /// The estimate has order 3 and the method 5: its step size goes with `rtol^(1/6)`, its error with `rtol^(5/6)`.
     fn tolerance(&self, rtol: f64) -> f64 {
-        0.1 * rtol.powf(2.0 / 3.0)
+        tolerance(rtol)
     }
 
     #[inline]
@@ -270,11 +320,9 @@ impl<const N: usize> OneStep<N> for Radau5 {
         work.before = Some((h, times(&POWERS, &trial.z)));
     }
 
-    /// Less after many iterations.
     #[inline]
     fn safety(&self, trial: &Trial<N>) -> f64 {
-        let most = f64::from(MOST);
-        0.9 * (2.0 * most + 1.0) / (2.0 * most + f64::from(trial.iterations))
+        safety(trial.iterations)
     }
 
     #[inline]

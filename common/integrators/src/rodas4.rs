@@ -14,11 +14,11 @@ use crate::pace::Pace;
 use crate::stability;
 use crate::{Complex, Dense, Jacobian, Ode, StepError};
 
-const STAGES: usize = 6;
-const GAMMA: f64 = 0.25;
+pub(crate) const STAGES: usize = 6;
+pub(crate) const GAMMA: f64 = 0.25;
 
 /// `a_ij`; the last two rows continue as `x + a u + u_5` and `x + a u + u_5 + u_6`.
-const A: [[f64; STAGES]; STAGES] = [
+pub(crate) const A: [[f64; STAGES]; STAGES] = [
     [0.0; STAGES],
     [1.544, 0.0, 0.0, 0.0, 0.0, 0.0],
     [0.946_678_528_081_582_6, 0.255_701_169_898_328_4, 0.0, 0.0, 0.0, 0.0],
@@ -28,7 +28,7 @@ const A: [[f64; STAGES]; STAGES] = [
 ];
 
 /// `c_ij`
-const C: [[f64; STAGES]; STAGES] = [
+pub(crate) const C: [[f64; STAGES]; STAGES] = [
     [0.0; STAGES],
     [-5.6688, 0.0, 0.0, 0.0, 0.0, 0.0],
     [-2.430_093_356_833_875, -0.206_359_915_709_191_5, 0.0, 0.0, 0.0, 0.0],
@@ -45,11 +45,11 @@ const C: [[f64; STAGES]; STAGES] = [
 ];
 
 /// Times of the stages, and the weights of the change of `f` with time.
-const ALPHA: [f64; STAGES] = [0.0, 0.386, 0.21, 0.63, 1.0, 1.0];
-const GAMMA_I: [f64; STAGES] = [0.25, -0.1043, 0.1035, -0.0362, 0.0, 0.0];
+pub(crate) const ALPHA: [f64; STAGES] = [0.0, 0.386, 0.21, 0.63, 1.0, 1.0];
+pub(crate) const GAMMA_I: [f64; STAGES] = [0.25, -0.1043, 0.1035, -0.0362, 0.0, 0.0];
 
 /// Continuous extension.
-const H: [[f64; STAGES - 1]; 2] = [
+pub(crate) const H: [[f64; STAGES - 1]; 2] = [
     [
         10.126_235_083_445_86,
         -7.487_995_877_610_167,
@@ -65,6 +65,9 @@ const H: [[f64; STAGES - 1]; 2] = [
         -6.594_389_125_716_872,
     ],
 ];
+
+/// Its control of the step size.
+pub(crate) const PACE: Pace = Pace { order: 4.0, beta: 0.0, shrink: 1.0 / 6.0, grow: 5.0, predictive: true };
 
 /// The method.
 pub(crate) struct Rodas4;
@@ -137,7 +140,7 @@ impl<const N: usize> OneStep<N> for Rodas4 {
     type Work = Work<N>;
 
     fn pace(&self) -> Pace {
-        Pace { order: 4.0, beta: 0.0, shrink: 1.0 / 6.0, grow: 5.0, predictive: true }
+        PACE
     }
 
     #[inline]

@@ -34,7 +34,7 @@ pub use closure::{Band, Conditioning, InconsistentClosure, close, conditioning};
 pub use drift::NotClosed;
 pub use element::{Answer, Body, Hinged, Load, Loaded, NotPositiveDefinite, Point};
 pub use joint::{Joint, Planar, Pose, Rigid};
-pub use scalar::Scalar;
+pub use scalar::{Scalar, tanh};
 pub use space::{Dim, Space, magnitude};
 pub use spatial::{Spatial, SpatialPose};
 pub use spring::{SpringDamper, SpringState};

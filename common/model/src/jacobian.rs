@@ -72,6 +72,16 @@ where
     }
 }
 
+/// Of a system without states.
+#[derive(Debug, Clone, Copy)]
+pub struct NoStates;
+
+impl Spectrum<0> for NoStates {
+    fn eigenvalues(_m: &Matrix<f64, 0, 0>) -> Option<[(f64, f64); 0]> {
+        Some([])
+    }
+}
+
 /// Eigenvalues of a real Schur form: of its diagonal blocks of one or two rows.
 ///
 /// A block of two whose eigenvalues are equal to rounding may have two real ones.

@@ -7,6 +7,35 @@ use crate::{Entry, Kind, Variables};
 /// Vector with components x, y, z.
 pub type Vector3<S> = nalgebra::Vector3<S>;
 
+/// Vector in the x-z plane with components x, z.
+pub type Vector2<S> = nalgebra::Vector2<S>;
+
+/// Symmetric tensor in the x-z plane with components xx, xz, zz.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlanarTensor<S> {
+    /// Component xx
+    pub xx: S,
+    /// Component xz
+    pub xz: S,
+    /// Component zz
+    pub zz: S,
+}
+
+impl<S: Scalar> PlanarTensor<S> {
+    /// Nothing.
+    #[must_use]
+    pub fn zero() -> Self {
+        let o = S::lift(0.0);
+        Self { xx: o, xz: o, zz: o }
+    }
+
+    /// As a matrix.
+    pub fn matrix(&self) -> nalgebra::Matrix2<S> {
+        let Self { xx, xz, zz } = *self;
+        nalgebra::Matrix2::new(xx, xz, xz, zz)
+    }
+}
+
 /// Symmetric tensor with components xx, xy, xz, yy, yz, zz.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SymmetricTensor<S> {
@@ -93,6 +122,34 @@ impl<S: Scalar> Variables<S> for Vector3<S> {
     #[inline]
     fn store(&self, values: &mut [S]) {
         values[..3].copy_from_slice(self.as_slice());
+    }
+}
+
+impl<S: Scalar> Variables<S> for Vector2<S> {
+    const TABLE: &'static [Entry] = &[Entry::scalar(".x", Kind::Float64), Entry::scalar(".z", Kind::Float64)];
+    #[inline]
+    fn load(v: &[S]) -> Self {
+        Self::new(v[0], v[1])
+    }
+    #[inline]
+    fn store(&self, values: &mut [S]) {
+        values[..2].copy_from_slice(self.as_slice());
+    }
+}
+
+impl<S: Scalar> Variables<S> for PlanarTensor<S> {
+    const TABLE: &'static [Entry] = &[
+        Entry::scalar(".xx", Kind::Float64),
+        Entry::scalar(".xz", Kind::Float64),
+        Entry::scalar(".zz", Kind::Float64),
+    ];
+    #[inline]
+    fn load(v: &[S]) -> Self {
+        Self { xx: v[0], xz: v[1], zz: v[2] }
+    }
+    #[inline]
+    fn store(&self, v: &mut [S]) {
+        v[..3].copy_from_slice(&[self.xx, self.xz, self.zz]);
     }
 }
 

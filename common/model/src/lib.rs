@@ -25,8 +25,8 @@ mod variable;
 
 pub use documentation::{Documentation, Plot};
 pub use error::{EvaluationError, ParameterError};
-pub use jacobian::{Dense, Spectrum, directional, state_jacobian};
-pub use leaf::{NoVariables, SymmetricTensor, Vector3};
+pub use jacobian::{Dense, NoStates, Spectrum, directional, state_jacobian};
+pub use leaf::{NoVariables, PlanarTensor, SymmetricTensor, Vector2, Vector3};
 pub use mechanics::{Matrix, Scalar};
 pub use model_derive::{Enumeration, Variables};
 pub use system::{Experiment, Group, Linear, Model, Outputs, Pace, System, Visitor};

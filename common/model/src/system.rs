@@ -115,8 +115,8 @@ pub trait Model: Clone + Sized + 'static {
         Vec::new()
     }
 
-    /// What a step has met that is allowed but probably not meant, as a log message; from the discrete states before and
-    /// after it.
+    /// What an event or a step has met that is allowed but probably not meant, as a log message; from the discrete states
+    /// before and after it.
     fn notice(_before: &Self::Discrete, _after: &Self::Discrete) -> Option<String> {
         None
     }
@@ -304,6 +304,36 @@ pub trait System<const N: usize, const Z: usize> {
     /// The next time at which [`System::update`] has to be called, if known.
     fn next_event(&self, _d: &<Self::Model as Model>::Discrete) -> Option<f64> {
         None
+    }
+
+    /// The time events are samples with this period [s]: they read inputs that the host passes on at communication points.
+    ///
+    /// A sample at the end of a step therefore waits for Event Mode or, without, for the next step, when the inputs of its
+    /// time are known; and a host's time may miss it by a millionth of the period, since hosts add steps up.
+    fn sample_period(&self) -> Option<f64> {
+        None
+    }
+
+    /// Discrete states at `t` where no event is due but inputs may have changed: in a further pass of the event iteration
+    /// (others have answered to what the last one put out) and, without Event Mode, at the start of a step; may change `x`.
+    fn revise(
+        &self,
+        _t: f64,
+        _x: &mut [f64; N],
+        _u: &<Self::Model as Model>::Inputs<f64>,
+        d: &<Self::Model as Model>::Discrete,
+    ) -> <Self::Model as Model>::Discrete {
+        *d
+    }
+
+    /// True if outputs have changed to which others may answer at this very time by inputs that the event reads: then the
+    /// event iteration goes on with [`System::revise`].
+    fn awaits_answer(
+        &self,
+        _before: &<Self::Model as Model>::Discrete,
+        _after: &<Self::Model as Model>::Discrete,
+    ) -> bool {
+        false
     }
 
     /// Discrete states after the event at `t`; may change `x`.

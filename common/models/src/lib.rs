@@ -5,7 +5,9 @@
 
 pub mod absorber;
 pub mod boom;
+pub mod effi;
 pub mod force_law;
+mod min_jerk;
 pub mod parts;
 pub mod port;
 pub mod suspension;

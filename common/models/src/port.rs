@@ -5,8 +5,8 @@
 //! follower  takes r, v, a    gives F0, M and F = F0 - M a
 //! ```
 
-use mechanics::{Dim, Load, Scalar, Space, Vector};
-use model::{SymmetricTensor, Variables, Vector3};
+use mechanics::{Dim, Load, Matrix, Scalar, Space, Vector};
+use model::{PlanarTensor, SymmetricTensor, Variables, Vector2, Vector3};
 
 /// Part of a vector along a fixed direction, a unit vector.
 pub(crate) fn along<S: Scalar>(direction: &Vector3<f64>, v: &Vector3<S>) -> S {
@@ -63,6 +63,22 @@ pub struct ScalarRoot<S> {
     /// Acceleration of the root port [m/s2]
     #[var(name = "a")]
     pub a: S,
+}
+
+/// A slot of a leader port that moves in the x-z plane.
+#[derive(Debug, Clone, Copy, PartialEq, Variables)]
+pub struct PlanarSlot<S> {
+    /// Force on the leader at rest [N]
+    #[var(name = "F")]
+    pub F: Vector2<S>,
+    /// Inertia behind the port [kg]
+    #[var(name = "M")]
+    pub M: PlanarTensor<S>,
+}
+
+/// Force and inertia of two planar slots together.
+pub(crate) fn planar_slots<S: Scalar>(a: &PlanarSlot<S>, b: &PlanarSlot<S>) -> (Vector2<S>, Matrix<S, 2, 2>) {
+    (a.F + b.F, a.M.matrix() + b.M.matrix())
 }
 
 /// The sum of the slots of a port; `None` if nothing acts.

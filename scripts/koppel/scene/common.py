@@ -4,6 +4,8 @@ Right-hand side: set states, sweep (with closing forces), get derivatives. Time 
 are located on the indicators; in Event Mode all components are swept and updated until none asks for more.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..fmu import Equations
@@ -11,6 +13,7 @@ from .errors import Diverged
 from .integrators import FIXED, Adaptive, Advance, FixedStep
 from .network import Network
 from .sampling import points_between
+from .stiff import Stiff
 
 #: State events are located to this part of max(|t|, step).
 EVENT_TIME = 1e-13
@@ -27,11 +30,7 @@ class Common:
         self._dot = np.empty(ends[-1])
         self._watched = [instance for instance in self._instances if instance.nz]
         self._fixed, self._step = integrator in FIXED, step
-        self._make = (
-            (lambda: FixedStep(integrator, step))
-            if self._fixed
-            else lambda: Adaptive(integrator, rtol, atol * self._nominals())
-        )
+        self._make = lambda: _integrator(integrator, step, rtol, atol, self._nominals)
         #: Where the components are: time and states as last placed.
         self._t, self._x = np.nan, np.empty(0)
         self.evaluations = self.steps = self.rejected = 0
@@ -77,22 +76,24 @@ class Common:
         before = self._indicators(t, self.x) > 0.0
         if same(self._indicators(to.t, to.x)):
             return to, False
-        a, b = t, to.t
+        a, b, state = t, to.t, to.again or to.between
         while b - a > EVENT_TIME * max(abs(b), to.t - t):
             middle = 0.5 * (a + b)
             if middle in (a, b):
                 break
-            if same(self._indicators(middle, to.between(middle))):
+            if same(self._indicators(middle, state(middle))):
                 a = middle
             else:
                 b = middle
-        return Advance(b, to.between(b), to.between, to.rejected), True
+        return Advance(b, state(b), to.between, to.rejected), True
 
     def _settle(self, sweep_first: bool = True) -> float:
         """Event Mode -> Continuous-Time Mode; time of the next event. Restarts where something has changed."""
         network = self._network
         x, u = self.x, network.u.copy()
         next_event, _ = network.settle(sweep_first)
+        if x is not None:
+            network.sweep()  # with what the update has changed
         for instance in self._instances:
             instance.go_on()
         self.x = np.concatenate([instance.x for instance in self._instances])
@@ -144,3 +145,12 @@ class Common:
             if due < len(samples) and samples[due] <= t:
                 recorder.take()
                 due += 1
+
+
+def _integrator(name: str, step: float | None, rtol: float, atol: float, nominals: Callable[[], np.ndarray]):
+    """The integrator of that name."""
+    if name in FIXED:
+        return FixedStep(name, step)
+    if name in Stiff.METHODS:
+        return Stiff(name, rtol, atol, nominals())
+    return Adaptive(name, rtol, atol * nominals())

@@ -3,7 +3,12 @@
 P   port.inputs = extrapolate; doStep
 E   Event Mode; sweep (with closing forces)
 C   restore; port.inputs = endpoint, port.order = k + 1; the new inputs; doStep; E again    (pece only)
+
+Without H that of pece follows the error (`StepControl`). Components without Event Mode answer sweeps by their linear
+response.
 """
+
+import math
 
 import numpy as np
 
@@ -15,25 +20,52 @@ from .stepping import Bound, Resets, Saved, Treatment
 
 #: Error control: the estimate is this part of the difference of predictor and corrector.
 ESTIMATE = 1.0 / 3.0
+#: First and least step of error control, relative to the length of the run.
+FIRST_STEP, LEAST_STEP = 1e-3, 1e-10
 #: Points of time are the same if they differ by less than this part of a step.
 SAME_TIME = 1e-9
 
 
-class CoSimulation:
-    """cs-predict, and with `correct` cs-pece. With `tolerance` (rtol, atol) the step size follows the error."""
+class StepControl:
+    """The communication step that follows the error.
 
-    def __init__(
-        self,
-        network: Network,
-        H: float,
-        order: int,
-        correct: bool,
-        tolerance: tuple[float, float] | None = None,
-    ):
-        self._network, self._H, self._order = network, H, order
-        self._tolerance = tolerance
-        if tolerance and not correct:
-            raise SceneError("cs-predict has a fixed H: error control needs the corrector, cs-pece")
+    first     1e-3 of the run
+    step      to the next sample, time event or stop if H reaches it; half the way if two steps are left; else H
+    after it  H <- h min(2, max(0.2, 0.9 error^(-1/(k + 2)))), and not shorter than before where h was cut by such a point
+              and the error lets it grow; beyond an error of 1 the step is repeated
+    least     1e-10 of the run
+    """
+
+    def __init__(self, length: float, order: int):
+        self.H, self._least, self._exponent = FIRST_STEP * length, LEAST_STEP * length, -1.0 / (order + 2)
+
+    def step(self, remaining: float) -> float:
+        """Length of the next step that leaves no tiny rest."""
+        # steps that are doubled and halved meet the limit but for rounding
+        if self.H >= remaining * (1.0 - SAME_TIME):
+            return remaining
+        return 0.5 * remaining if 2.0 * self.H > remaining else self.H
+
+    def judge(self, h: float, error: float) -> bool:
+        """Takes note of a step with its error in units of the tolerance; whether it counts."""
+        # an error that is no number shortens the step
+        error = math.inf if math.isnan(error) else max(error, 1e-10)
+        factor = min(2.0, max(0.2, 0.9 * error**self._exponent))
+        accepted = error <= 1.0
+        self.H = max(self.H, h * factor) if accepted and factor >= 1.0 else h * factor
+        return accepted
+
+    @property
+    def exhausted(self) -> bool:
+        """The step has become too small to go on."""
+        return self.H < self._least
+
+
+class CoSimulation:
+    """cs-predict, and with `correct` cs-pece. Without H the step of cs-pece follows the error, to `tolerance` (rtol, atol)."""
+
+    def __init__(self, network: Network, H: float | None, order: int, correct: bool, tolerance: tuple[float, float]):
+        self._network, self._H, self._order, self._tolerance = network, H, order, tolerance
         instances = list(network.instances.values())
         self._all, self._in_events = instances, [i for i in instances if i.event_mode]
         self._treatment, self._resets, self._bound = Treatment(instances), Resets(instances), Bound(network)
@@ -59,6 +91,9 @@ class CoSimulation:
     def _enter_event_mode(self):
         for instance in self._in_events:
             instance.enter_event_mode()
+        self._observe()
+
+    def _observe(self):
         for response in self._network.responses.values():
             response.after_step()
 
@@ -87,15 +122,17 @@ class CoSimulation:
         self._treatment.set("endpoint", self._order + 1)
         self._enter_step_mode()
         self._network.write_inputs()
-        self._step_all(t, H, final=self._tolerance is None)
+        self._step_all(t, H, final=self._H is not None)
 
     # run ------------------------------------------------------------------------------------------------------------
     def start(self, samples: np.ndarray, recorder):
         """Initialization, first events, first sample."""
-        for a, b in zip(samples, samples[1:]):
-            if self._tolerance is None:
+        if self._H is not None:
+            for a, b in zip(samples, samples[1:]):
                 points_between(a, b, self._H)
+        self._control = StepControl(float(samples[-1] - samples[0]), self._order)
         self._network.initialise(samples[0], samples[-1])
+        self._observe()
         self._treatment.set("extrapolate", self._order)
         self._next_event, _ = self._network.settle()
         recorder.take()
@@ -104,7 +141,7 @@ class CoSimulation:
         """From the first sample to the last."""
         t = float(samples[0])
         for a, b in zip(samples, samples[1:]):
-            points = points_between(a, b, self._H if self._tolerance is None else b - a)
+            points = points_between(a, b, b - a if self._H is None else self._H)
             for after in points[1:].tolist():
                 t = self._advance(t, after)
             recorder.take()
@@ -114,7 +151,7 @@ class CoSimulation:
 
         A point and an event that differ in their last digits are one: a discontinuity must not begin just behind a point.
         """
-        step = self._fixed if self._tolerance is None else self._controlled
+        step = self._controlled if self._H is None else self._fixed
         near = SAME_TIME * (after - t)
         while t + near < self._next_event < after - near:
             event = self._next_event
@@ -148,22 +185,21 @@ class CoSimulation:
             self._saved.save()
             u = self._network.u.copy()
             while True:
-                H = min(self._H, _reaching(t, stop))
-                # no sliver before the end
-                H = 0.5 * (stop - t) if H < stop - t < 1.5 * H else H
+                H = self._control.step(_reaching(t, stop))
                 self._predict(t, H)
                 self._evaluate()
                 predicted = self._network.y[self._motion]
                 self._correct(t, H)
                 self._evaluate()
-                e = self._error(predicted, self._network.y[self._motion])
-                factor = min(2.0, max(0.2, 0.9 * max(e, 1e-10) ** (-1.0 / (self._order + 2))))
-                if e <= 1.0:
+                parts = self._errors(predicted, self._network.y[self._motion])
+                if self._control.judge(H, float(np.max(parts, initial=0.0))):
                     break
                 self.rejected += 1
-                self._H = H * factor
-                if self._H < 1e-9 * stop:
-                    raise SceneError(f"H fell to {self._H:.3g} s at t = {t:.6g} s: the tolerance cannot be met")
+                if self._control.exhausted:
+                    worst = self._network.output_name(int(np.flatnonzero(self._motion)[np.argmax(parts)]))
+                    raise SceneError(
+                        f"t = {t:.6f} s: communication step fell to {self._control.H:.3e} s; worst signal: {worst}"
+                    )
                 self._saved.restore()
                 self._treatment.set("extrapolate", self._order)
                 self._network.u[:] = u
@@ -172,14 +208,12 @@ class CoSimulation:
             self._accept(swept=True)
             self.steps += 1
             t = stop if H >= stop - t else t + H
-            # a step cut short by a sample says nothing about longer ones
-            self._H = max(self._H, H * factor) if H < self._H else H * factor
             self._bound.check(t)
 
-    def _error(self, predicted: np.ndarray, corrected: np.ndarray) -> float:
+    def _errors(self, predicted: np.ndarray, corrected: np.ndarray) -> np.ndarray:
+        """Local errors in units of the tolerance."""
         rtol, atol = self._tolerance
-        scale = atol * self._network.nominal[self._motion] + rtol * np.abs(corrected)
-        return float(ESTIMATE * np.max(np.abs(corrected - predicted) / scale, initial=0.0))
+        return ESTIMATE * np.abs(corrected - predicted) / (atol + rtol * np.abs(corrected))
 
 
 def _reaching(t: float, end: float) -> float:

@@ -20,7 +20,7 @@ from .errors import SceneError, near
 from .ports import AXES, Port
 
 METHODS = ("common", "cs-predict", "cs-pece", "jacobi", "seidel")
-INTEGRATORS = ("heun", "rk4", "dopri5", "dop853")
+INTEGRATORS = ("heun", "rk4", "dopri5", "dop853", "rodas4", "radau5")
 FIXED_STEP = ("heun", "rk4")
 
 #: A variable of a component: (component, variable).
@@ -80,11 +80,11 @@ class Settings:
     #: Step of a fixed-step integrator [s].
     step: float | None = None
     rtol: float = 1e-6
-    #: Times the nominal value of each state or exchanged value.
+    #: Method common: times the nominal value of each state; cs-pece: of positions and velocities [m, m/s].
     atol: float = 1e-9
     #: Degree of the extrapolated inputs; k of pece.
     order: int = 1
-    #: Communication step [s].
+    #: Communication step [s]; None: that of cs-pece follows the error.
     H: float | None = None
     #: Stabilisation of closing joints [1/s].
     alpha: float = 2.0
@@ -115,7 +115,7 @@ class Scene:
 
     def __init__(self, name: str, fmus=None):
         self.name = name
-        self._fmus = fmus
+        self.fmus = fmus
         self._opened: dict[Path, Fmu] = {}
         self.components: dict[str, Component] = {}
         self.connections: list[Connection] = []
@@ -175,11 +175,11 @@ class Scene:
     def _open(self, fmu) -> Fmu:
         if isinstance(fmu, Fmu):
             return fmu
-        if callable(self._fmus) and isinstance(fmu, str):
-            return self._fmus(fmu)
+        if callable(self.fmus) and isinstance(fmu, str):
+            return self.fmus(fmu)
         path = Path(fmu)
         if path.suffix != ".fmu":
-            path = (Path(self._fmus) if self._fmus else paths.DIST / "fmi3") / f"{fmu}.fmu"
+            path = (Path(self.fmus) if self.fmus else paths.DIST / "fmi3") / f"{fmu}.fmu"
         path = path.resolve()
         if path not in self._opened:
             if not path.is_file():
@@ -213,7 +213,7 @@ class Scene:
             raise SceneError(f"{first} and {second}: a scalar port cannot be connected to a spatial one")
         if factor != 1.0 and not raw:
             raise SceneError(f"{first} and {second}: a factor ({factor}) is for raw connections, inertia has no sign")
-        axes = self._axes(lead, follow)
+        axes = self._axes((lead, leader), (follow, follower))
         slot = slot or self._free_slot(lead, leader, axes)
         back = ports.force_pairs(leader, follower, axes, slot, raw)
         forward = ports.motion_pairs(leader, follower, axes) if motion else []
@@ -314,12 +314,13 @@ class Scene:
         except SceneError as unknown:
             raise SceneError(f"{component.name}: {unknown}") from None
 
-    def _axes(self, *components: Component) -> tuple[str, ...]:
-        return ("x", "z") if any(component.planar for component in components) else AXES
+    def _axes(self, *ends: tuple[Component, Port]) -> tuple[str, ...]:
+        planar = any(component.planar or port.planar for component, port in ends)
+        return ("x", "z") if planar else AXES
 
     def joint_axes(self, joint: Joint) -> tuple[str, ...]:
         """Axes in which the joint closes."""
-        return self._axes(self.split(joint.first)[0], self.split(joint.second)[0])
+        return self._axes(self.port(joint.first), self.port(joint.second))
 
     def _free_slot(self, component: Component, port: Port, axes: tuple[str, ...], besides: Iterable[str] = ()) -> int:
         used = {variable for name, variable in self._sources if name == component.name} | set(besides)

@@ -16,7 +16,7 @@ class Diverged(SceneError):
     """Exchanged values have left every reasonable range."""
 
     def __init__(self, time: float, cause: str):
-        super().__init__(f"diverged at t = {time:.6g} s: {cause}")
+        super().__init__(f"diverged at t = {time:.4f} s: {cause}")
         self.time = time
 
 

@@ -33,6 +33,8 @@ class Advance:
     x: np.ndarray
     between: Callable[[float], np.ndarray]
     rejected: int = 0
+    #: The method itself repeated up to a time, to locate events; `between` where there is none.
+    again: Callable[[float], np.ndarray] | None = None
 
 
 class FixedStep:

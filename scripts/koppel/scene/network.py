@@ -46,7 +46,7 @@ class Network:
             scene.connections,
             feeds=[feed for joint in self.joints for feed in joint.feeds],
             wanted=[output for joint in self.joints for output in joint.wanted],
-            depends=self._depends,
+            depends=self.depends,
         )
         self._at_u = self._positions(self.graph.inputs)
         self._at_y = self._positions(self.graph.outputs)
@@ -57,7 +57,8 @@ class Network:
     def _component(self, ref: Ref) -> Component:
         return self.scene.components[ref[0]]
 
-    def _depends(self, output: Ref) -> list[Ref]:
+    def depends(self, output: Ref) -> list[Ref]:
+        """Inputs on which an output is declared to depend."""
         fmu = self._component(output).fmu
         declared = fmu.dependencies(output[1])
         names = fmu.names("input") if declared is None else declared

@@ -72,6 +72,11 @@ class Port:
         return self.fmu.variable(first[0]).causality == "output"
 
     @property
+    def planar(self) -> bool:
+        """Has no y components."""
+        return not self.scalar and f"{self.name}.r.y" not in self.fmu.variables
+
+    @property
     def position(self) -> str:
         """Name of the position."""
         return "s" if self.scalar else "r"

@@ -20,8 +20,11 @@ class Response:
         #: Between steps; otherwise (Initialization Mode) values are read and set as always.
         self.active = False
         self._inputs, self._outputs = network.inputs_of(name), network.outputs_of(name)
+        #: By input: the outputs that depend on it.
+        on = [network.depends(output) for output in self._outputs]
+        self._dependent = [[row for row, known in enumerate(on) if ref in known] for ref in self._inputs]
         fmu = network.scene.components[name].fmu
-        if self._inputs and not fmu.capability("providesDirectionalDerivatives"):
+        if any(self._dependent) and not fmu.capability("providesDirectionalDerivatives"):
             raise SceneError(
                 f"{name} ({fmu.path.name}) has neither Event Mode nor directional derivatives: use method jacobi or seidel"
             )
@@ -29,14 +32,16 @@ class Response:
         self._u, self._y = network.inputs_at(self._inputs), network.outputs_at(self._outputs)
         self._read_u = instance.block([ref[1] for ref in self._inputs])
         self._read_y = instance.block([ref[1] for ref in self._outputs])
+        self._D = np.zeros((len(self._outputs), len(self._inputs)))
 
     def after_step(self):
         """Take values and derivatives of the end of the step; inputs are those of its polynomials' ends."""
         self._u_old = self._read_u.read().copy()
         self._y_old = self._read_y.read().copy()
-        unknowns = [ref[1] for ref in self._outputs]
-        columns = [self._network.derivative(self._name, unknowns, ref[1]) for ref in self._inputs]
-        self._D = np.array(columns).T.reshape(len(self._outputs), len(self._inputs))
+        for column, (ref, rows) in enumerate(zip(self._inputs, self._dependent)):
+            if rows:
+                unknowns = [self._outputs[row][1] for row in rows]
+                self._D[rows, column] = self._network.derivative(self._name, unknowns, ref[1])
         self.active = True
 
     def before_step(self):

@@ -16,6 +16,7 @@ from .exchange import Exchange
 from .network import Network
 from .result import SceneResult, audited, kinds
 from .sampling import Recorder, Unrecorded, sample_times
+from .stepping import DIVERGED
 
 
 def run(
@@ -28,14 +29,13 @@ def run(
     stop: float | None = None,
     values: Mapping[str, Value] | None = None,
     raw: bool = False,
-    controlled: bool = False,
     **settings,
 ) -> SceneResult:
     """Run the scene once.
 
     `record`: sample the recorded variables. `audit`: and all energies. `values`: parameters for every component that has
-    them (solver.method ...). `raw`: let a plain exchange run with raw connections of heavy followers. `controlled`: H of
-    cs-pece follows the error (rtol, atol), H is the first. Others: fields of `Settings`, for this run.
+    them (solver.method ...). `raw`: let a plain exchange run with raw connections of heavy followers. Others: fields of
+    `Settings`, for this run; without H that of cs-pece follows the error (rtol, atol).
     """
     chosen = replace(scene.settings, **settings)
     if "H" in settings and "step" not in settings:
@@ -53,34 +53,33 @@ def run(
         alpha=chosen.alpha,
     )
     with network:
-        method = _method(network, chosen, controlled, raw)
+        method = _method(network, chosen, raw)
         recorder = Recorder(network, scene.recorded, audit, len(samples)) if record or audit else Unrecorded()
         with np.errstate(over="ignore", invalid="ignore"):
             wall, cpu = _timed(method, network, samples, recorder)
         return _result(scene, chosen.method, network, method, samples, recorder, wall, cpu, _warnings(scene, chosen))
 
 
-def _method(network: Network, chosen, controlled: bool, raw: bool):
+def _method(network: Network, chosen, raw: bool):
     if chosen.method == "common":
         step = chosen.step or chosen.H
         if chosen.integrator in FIXED_STEP and step is None:
             raise SceneError(f"{chosen.integrator} needs a step (step or H)")
         return Common(network, chosen.integrator, step, chosen.rtol, chosen.atol)
-    if chosen.H is None:
+    if chosen.H is None and chosen.method != "cs-pece":
         raise SceneError(f"{chosen.method} needs a communication step H")
     if chosen.method in ("jacobi", "seidel"):
         return Exchange(network, chosen.H, chosen.order, chosen.method == "seidel", raw)
     correct = chosen.method == "cs-pece"
     if correct and chosen.order == 0:
         raise SceneError("order = 0: cs-pece has k = 1 or 2")
-    tolerance = (chosen.rtol, chosen.atol) if controlled else None
-    return CoSimulation(network, chosen.H, chosen.order, correct, tolerance)
+    return CoSimulation(network, chosen.H, chosen.order, correct, (chosen.rtol, chosen.atol))
 
 
 def _warnings(scene: Scene, chosen) -> list[Message]:
     """What is allowed but probably not meant."""
     step = (chosen.step or chosen.H) if chosen.method == "common" else chosen.H
-    fixed = chosen.method != "common" or chosen.integrator in FIXED_STEP
+    fixed = step is not None and (chosen.method != "common" or chosen.integrator in FIXED_STEP)
     # a step that is 1/alpha by its digits may be a last bit above
     if not (scene.joints and fixed and chosen.alpha * step > 1.0 + 1e-9):
         return []
@@ -96,15 +95,19 @@ def _timed(method, network: Network, samples: np.ndarray, recorder) -> tuple[flo
         method.loop(samples, recorder)
     except FmuError as failed:
         # values that have run away are refused by the FMU before they reach the bound here
-        if failed.status == Status.DISCARD and not _reasonable(network):
-            raise Diverged(network.time, str(failed)) from failed
+        if failed.status == Status.DISCARD and (cause := _run_away(network)):
+            raise Diverged(network.time, cause) from failed
         raise
     return (time.perf_counter_ns() - wall) * 1e-9, (time.process_time_ns() - cpu) * 1e-9
 
 
-def _reasonable(network: Network) -> bool:
-    values = np.concatenate([network.u, network.y])
-    return bool((np.isfinite(values) & (np.abs(values) < 1e9)).all())
+def _run_away(network: Network) -> str | None:
+    """The first coupled output that is no number or beyond every reasonable range."""
+    fine = np.abs(network.y) < DIVERGED
+    if fine.all():
+        return None
+    first = int(np.argmin(fine))
+    return f"{network.output_name(first)} = {network.y[first]:.3e}"
 
 
 def _result(scene: Scene, name: str, network: Network, method, samples, recorder, wall, cpu, warnings) -> SceneResult:

@@ -84,4 +84,4 @@ class Bound:
         if not fine.all():
             worst = int(np.argmin(fine))
             name = self._network.output_name(worst)
-            raise Diverged(t, f"{name} = {self._y[worst]:.3g}")
+            raise Diverged(t, f"{name} = {self._y[worst]:.3e}")

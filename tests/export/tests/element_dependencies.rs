@@ -3,6 +3,7 @@
 use export_tests::{Random, sparsity::Sparsity};
 use model::Model;
 use models::absorber::{PrimaryOscillator, RvdpAbsorber};
+use models::effi::{Arm, Controller, Mechanism, Plant, Wall};
 use models::parts::{Bushing, Guide, Load};
 use models::suspension::{DoublePendulum, FourBar, Link2, Link3, StrutLink};
 
@@ -96,4 +97,40 @@ fn rvdp_absorber_dependencies_are_exact() {
         &[&kind(2.0, 2.0)[..], &general].concat(),
         &[&kind(2.0, 3.0)[..], &general, &[("use.stroke_stop", 1.0), ("stroke.limit", 1e-3)]].concat(),
     ]);
+}
+
+#[test]
+fn dependencies_of_the_haptic_interface_are_exact() {
+    let moving = [
+        ("H.start.x", 0.1),
+        ("H.start.z", 0.62),
+        ("H.start.v.x", 0.2),
+        ("H.start.v.z", -0.3),
+        ("use.encoder", 0.0),
+    ];
+    let saturated = [("axis.v_knee", 1e-3), ("axis.F_peak", 1e-3)];
+    declared_are_observed::<Plant>(&[
+        &moving,
+        &[&moving[..], &saturated].concat(),
+        &[&moving[..], &saturated].concat(),
+        &[&moving[..], &saturated, &[("H.start.v.x", -0.2), ("H.start.v.z", 0.3)]].concat(),
+    ]);
+    declared_are_observed::<Controller>(&[&[], &[("mode", 2.0)], &[("mode", 1.0)]]);
+}
+
+#[test]
+fn dependencies_of_what_it_renders_are_exact() {
+    let drawer = [
+        ("kind", 2.0),
+        ("drawer.direction.z", 0.7),
+        ("drawer.s.start", 0.05),
+        ("drawer.v.start", 0.2),
+        ("drawer.detent.energy", 1.0),
+    ];
+    let in_stop = [("phi.start", 0.82), ("phi_rate.start", 0.5)];
+    declared_are_observed::<Mechanism>(&[&[("phi_rate.start", 0.5)], &in_stop, &drawer]);
+    let wall = [("normal.x", 0.3), ("normal.y", 0.2), ("point.z", 3.0), ("damping", 10.0), ("friction", 0.3)];
+    declared_are_observed::<Wall>(&[&wall]);
+    let hand = [("start.v.x", 0.2), ("start.v.z", 0.3)];
+    declared_are_observed::<Arm>(&[&hand, &[&hand[..], &[("intent.kind", 2.0)]].concat()]);
 }

@@ -281,11 +281,7 @@ pub unsafe fn fmi2CompletedIntegratorStep<I: Exported>(
 #[doc(hidden)]
 pub unsafe fn fmi2DoStep<I: Exported>(instance: *mut c_void, t: f64, step: f64) -> Status {
     // SAFETY: FMI instance, checked for null by `call`.
-    unsafe {
-        shared::call_with_warnings::<I>(instance, &phase::DO_STEP, |c| {
-            c.instance.do_step(t, step).map(|_| ())
-        })
-    }
+    unsafe { call::<I>(instance, &phase::DO_STEP, |c| c.instance.do_step(t, step).map(|_| ())) }
 }
 
 /// `fmi2LastSuccessfulTime` of `fmi2StatusKind`

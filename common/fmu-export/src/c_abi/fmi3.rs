@@ -136,7 +136,7 @@ pub unsafe fn fmi3DoStep<I: Exported>(
 ) -> Status {
     // SAFETY: FMI pointers, checked for null by `call` and `array_mut`.
     unsafe {
-        shared::call_with_warnings::<I>(instance, &phase::DO_STEP, |c| {
+        call::<I>(instance, &phase::DO_STEP, |c| {
             let flags = [
                 ("eventHandlingNeeded", event_handling_needed),
                 ("terminateSimulation", terminate_simulation),

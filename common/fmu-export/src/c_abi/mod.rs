@@ -51,7 +51,7 @@ unsafe fn call<I: Exported>(
         body(component)
     }));
     let fault = match result {
-        Ok(Ok(())) => return Status::Ok,
+        Ok(Ok(())) => return warned(component),
         Ok(Err(fault)) => fault,
         Err(panic) => {
             component.instance.break_down();
@@ -65,6 +65,18 @@ unsafe fn call<I: Exported>(
     };
     component.log.fault(rule.function, &fault);
     fault.status()
+}
+
+/// Status of a call that was carried out: with a warning if the instance has something to say.
+#[inline]
+fn warned<I: Exported>(component: &mut Component<I>) -> Status {
+    if !component.instance.has_warnings() {
+        return Status::Ok;
+    }
+    for warning in component.instance.take_warnings() {
+        component.log.send(Status::Warning, WARNING_CATEGORY, &warning);
+    }
+    Status::Warning
 }
 
 /// The data behind a C array; null is an empty array if `n` is 0.

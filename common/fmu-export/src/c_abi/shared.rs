@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_void};
 
 use model::Kind;
 
-use super::{Component, WARNING_CATEGORY, array, array_mut, call, put, text};
+use super::{array, array_mut, call, put, text};
 use crate::phase::Rule;
 use crate::{Exported, Fault, SerialisedStateError, Status};
 
@@ -123,31 +123,9 @@ pub(super) unsafe fn set_debug_logging<I: Exported>(
     }
 }
 
-/// A call whose warnings are sent.
-pub(super) unsafe fn call_with_warnings<I: Exported>(
-    instance: *mut c_void,
-    rule: &Rule,
-    body: impl FnOnce(&mut Component<I>) -> Result<(), Fault>,
-) -> Status {
-    let mut warned = false;
-    // SAFETY: FMI instance, checked for null by `call`; the same for the functions below.
-    let status = unsafe {
-        call::<I>(instance, rule, |c| {
-            body(c)?;
-            for warning in c.instance.take_warnings() {
-                c.log.send(Status::Warning, WARNING_CATEGORY, &warning);
-                warned = true;
-            }
-            Ok(())
-        })
-    };
-    if status == Status::Ok && warned { Status::Warning } else { status }
-}
-
-/// End of initialisation, with the warnings of the model.
 pub(super) unsafe fn exit_initialization<I: Exported>(instance: *mut c_void, rule: &Rule) -> Status {
-    // SAFETY: see above.
-    unsafe { call_with_warnings::<I>(instance, rule, |c| c.instance.exit_initialization()) }
+    // SAFETY: FMI instance, checked for null by `call`; the same for the functions below.
+    unsafe { call::<I>(instance, rule, |c| c.instance.exit_initialization()) }
 }
 
 pub(super) unsafe fn terminate<I: Exported>(instance: *mut c_void, rule: &Rule) -> Status {

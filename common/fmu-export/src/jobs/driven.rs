@@ -6,7 +6,7 @@ use integrators::{Indicators, Jacobian, Method, Ode, Solver};
 use model::{EvaluationError, Matrix, Model, Pace, System, Variables, state_jacobian};
 use num_dual::Dual64;
 
-use super::due;
+use super::{due, slack};
 use crate::inputs::Polynomials;
 
 /// Largest number of updates for events at one time.
@@ -120,11 +120,25 @@ impl<const N: usize, const Z: usize, Y: System<N, Z>> Driven<'_, N, Z, Y> {
         self.system.longest_step(x, u, &self.d)
     }
 
+    /// Look at inputs that may have changed, unless an event that is due does so.
+    pub(super) fn revise(&mut self, t: f64, x: &mut [f64; N], solver: &mut Solver) {
+        if self.system.next_event(&self.d).is_some_and(|event| due(event, t, slack(self.system))) {
+            return;
+        }
+        inputs_at!(self, t, u);
+        let d = self.system.revise(t, x, u, &self.d);
+        if d != self.d {
+            self.d = d;
+            solver.reset();
+        }
+    }
+
     /// Carry out the time events that are due at `t`.
     pub(super) fn pass_events(&mut self, t: f64, x: &mut [f64; N], solver: &mut Solver) {
+        let slack = slack(self.system);
         for _ in 0..MAX_UPDATES {
             match self.system.next_event(&self.d) {
-                Some(event) if due(event, t) => {
+                Some(event) if due(event, t, slack) => {
                     inputs_at!(self, t, u);
                     self.d = self.system.update(event.max(t), x, u, &self.d);
                     solver.reset();

@@ -10,7 +10,7 @@ use num_dual::Dual64;
 
 use super::driven::{Course, Driven, inputs_at};
 use super::linear::{LinearCache, advance};
-use super::{due, not_finite};
+use super::{due, not_finite, slack};
 use crate::Fault;
 use crate::solver::{SolverMethod, method_name};
 
@@ -68,23 +68,33 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
         };
         let adaptive = solver.settings().method.is_adaptive();
         let mut t = from;
+        let slack = slack(system);
+        // samples at the end of the step wait for the inputs of that time
+        let leave_events = self.leave_events || system.sample_period().is_some();
+        if !self.leave_events {
+            driven.revise(from, &mut x, &mut solver);
+        }
         let most_work = statistics.work(N) + MAX_EVALUATIONS;
         loop {
             if statistics.work(N) > most_work {
                 // many events, each cheap
                 return Err(fault(StepError::TooMuchWork { t, t_end: to, h: solver.memory().step }));
             }
-            if t < to || !self.leave_events {
+            if t < to || !leave_events {
                 driven.pass_events(t, &mut x, &mut solver);
             }
             if t >= to {
                 break;
             }
-            let mut target = system.next_event(&driven.d).filter(|event| *event < to).unwrap_or(to);
+            let mut target = system.next_event(&driven.d).filter(|event| *event < to - slack).unwrap_or(to);
             if self.auto {
                 let span = driven.choose_method(t, &x, &mut solver);
                 if span < 0.75 * (target - t) {
                     target = t + span;
+                    if target <= t {
+                        // below the resolution of time
+                        return Err(fault(StepError::TooMuchWork { t, t_end: to, h: span }));
+                    }
                 }
             }
             if adaptive {
@@ -117,7 +127,7 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
         *self.d = driven.d;
         *self.solver = solver;
         *self.statistics = statistics;
-        Ok(system.next_event(&driven.d).is_some_and(|event| due(event, to)))
+        Ok(system.next_event(&driven.d).is_some_and(|event| due(event, to, slack)))
     }
 }
 

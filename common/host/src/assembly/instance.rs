@@ -54,8 +54,8 @@ pub(super) struct Loaded {
     pub(super) sweeper: Sweeper,
 }
 
-/// Numbers of the methods in `solver.method` that the host integrates with: heun, rk4, dopri5, dop853.
-const OFFERED: &[i64] = &[1, 2, 3, 4];
+/// Numbers of the methods in `solver.method` that the host integrates with: heun, rk4, dopri5, dop853, rodas4, radau5.
+const OFFERED: &[i64] = &[1, 2, 3, 4, 5, 6];
 
 /// Communication step of the default experiment: the interval of recording, at most 1000 of them.
 pub(super) fn experiment_step(config: &Config) -> f64 {
@@ -213,6 +213,10 @@ impl Exported for Assembly {
 
     fn type_name(&self, kind: Kind) -> &'static str {
         self.interface.standard().type_name(kind)
+    }
+
+    fn has_warnings(&self) -> bool {
+        !self.warnings.is_empty()
     }
 
     fn take_warnings(&mut self) -> Vec<String> {

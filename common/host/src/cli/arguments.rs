@@ -60,7 +60,7 @@ pub(super) struct Run {
     /// common, cs-predict, cs-pece, jacobi or seidel
     #[arg(long)]
     method: Option<String>,
-    /// heun, rk4, dopri5 or dop853 (method common)
+    /// heun, rk4, dopri5, dop853, rodas4 or radau5 (method common)
     #[arg(long)]
     integrator: Option<String>,
     /// Communication step, and step of heun and rk4 [s]

@@ -138,6 +138,16 @@ impl Instance {
         self.fmu.capabilities(self.interface).expect("declared")
     }
 
+    /// Whether it has an Event Mode as it is used.
+    #[must_use]
+    pub fn has_event_mode(&self) -> bool {
+        match self.interface {
+            Interface::CoSimulation => self.capabilities().event_mode,
+            Interface::PlainCoSimulation => false,
+            Interface::ModelExchange => true,
+        }
+    }
+
     /// Calls so far.
     #[must_use]
     pub fn counts(&self) -> Counts {

@@ -6,7 +6,7 @@ pub(crate) use run::{Run, RunState};
 
 use std::ops::Range;
 
-use integrators::{DynamicOde, NotExplicit, StepError};
+use integrators::{DynamicOde, NoSolver, StepError};
 
 use super::{Clock, Config, Progress, Steps};
 use crate::error::{Error, RunError};
@@ -37,7 +37,7 @@ pub(super) fn run(
         progress(run.t);
     }
     let (seconds, cpu) = begin.read();
-    let statistics = run.solver.statistics;
+    let statistics = run.statistics();
     Ok(Steps {
         accepted: statistics.steps,
         rejected: statistics.rejected,
@@ -109,7 +109,7 @@ fn integrator(error: StepError<RunError>) -> Error {
     }
 }
 
-fn refused(error: NotExplicit) -> Error {
+fn refused(error: NoSolver) -> Error {
     let wanted = error.to_string();
     SceneError::Setting { name: "integrator", value: String::new(), wanted }.into()
 }

@@ -4,25 +4,25 @@
 //! predict   step with extrapolated inputs, sweep
 //! pece      step with extrapolated inputs, sweep; back; step with the inputs of the end, sweep
 //! error     max |x_C - x_P| / (atol + rtol |x|) / 3 over positions and velocities of all ports
-//! H         <- H min(2, max(0.2, 0.9 error^(-1/(k + 2))))
 //! ```
+//! Without a given step that of pece follows the error, see `step_control.rs`; samples are then communication points,
+//! whether they are recorded or not. FMUs without Event Mode answer sweeps by their linear response.
 
 use super::exchange::do_step;
 use super::inputs::{Inputs, Treatment};
+use super::step_control::StepControl;
 use super::{Clock, Config, MethodKind, Progress, Steps, events};
 use crate::error::{Error, RunError};
-use crate::import::Saved;
+use crate::import::{Instance, Saved};
 use crate::record::Recorder;
 use crate::scene::SceneError;
 use crate::start;
 use crate::sweep::Sweeper;
 
-/// First step of a controlled run, relative to its length.
-const FIRST_STEP: f64 = 1e-3;
 /// Times that differ by less than this part of a step are one.
 const SAME_TIME: f64 = 1e-9;
-/// Smallest step, relative to the length of the run.
-const LEAST_STEP: f64 = 1e-10;
+/// Part of the estimate: the error is this part of the difference of predictor and corrector.
+const ESTIMATE: f64 = 1.0 / 3.0;
 
 /// Runs from start to stop.
 pub(super) fn run(
@@ -35,21 +35,29 @@ pub(super) fn run(
     let inputs = Inputs::of(sweeper);
     inputs.set_all(sweeper, Treatment::Extrapolate, config.order)?;
     start::initialise(sweeper, config)?;
+    for node in 0..sweeper.instances.len() {
+        if !sweeper.instances[node].has_event_mode() {
+            sweeper.answer_linearly(node);
+        }
+    }
+    sweeper.observe_responses()?;
     let mut run = Run {
         saved: (0..sweeper.instances.len()).map(|_| None).collect(),
         inputs,
         config: *config,
         t: config.start,
+        found: Vec::new(),
         kept: Vec::new(),
         predicted: Vec::new(),
         steps: Steps::default(),
-        step: config.step.unwrap_or(FIRST_STEP * (config.stop - config.start)),
+        control: StepControl::new(config),
         grid: 0,
+        sample: 0,
         next_event: None,
         event_wanted: false,
         sweeper,
     };
-    run.update()?;
+    run.update(false)?;
     recorder.offer(run.sweeper, config, run.t)?;
     let begin = Clock::start();
     let mut result = Ok(());
@@ -66,15 +74,15 @@ pub(super) fn run(
 
 /// All FMUs offer what the method needs.
 fn check(sweeper: &Sweeper, config: &Config) -> Result<(), SceneError> {
-    for (name, instance) in sweeper.names.iter().zip(&sweeper.instances) {
+    for (node, (name, instance)) in sweeper.names.iter().zip(&sweeper.instances).enumerate() {
         let lacks = |wanted| SceneError::Capability {
             method: config.method.name().into(),
             component: name.clone(),
             fmu: instance.fmu().description.name.clone(),
             wanted,
         };
-        if !instance.capabilities().event_mode {
-            return Err(lacks("Event Mode (hasEventMode); jacobi and seidel do without"));
+        if !instance.has_event_mode() && !sweeper.can_answer_linearly(node) {
+            return Err(lacks("Event Mode or directional derivatives; jacobi and seidel do without"));
         }
         if config.method == MethodKind::CsPece && !instance.capabilities().state_saving {
             return Err(lacks("saving of its state (canGetAndSetFMUState); cs-predict does without"));
@@ -88,15 +96,19 @@ struct Run<'a> {
     inputs: Inputs,
     config: Config,
     t: f64,
-    /// Communication step [s]
-    step: f64,
+    /// Where no step is given
+    control: StepControl,
     /// Points of a fixed grid so far
     grid: u64,
+    /// Next sample, where the step is controlled
+    sample: u64,
     /// Next time event [s]
     next_event: Option<f64>,
     /// A component asked for Event Mode in the last step
     event_wanted: bool,
     saved: Vec<Option<Saved>>,
+    /// Inputs at the start of the step, as swept
+    found: Vec<f64>,
     /// Inputs at the end of the predicted step
     kept: Vec<f64>,
     /// Positions and velocities at its end
@@ -105,16 +117,16 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// In Event Mode at an accepted point.
-    fn update(&mut self) -> Result<(), RunError> {
+    /// In Event Mode at an accepted point; `swept`: with all inputs in step.
+    fn update(&mut self, swept: bool) -> Result<(), RunError> {
         if self.event_wanted {
             self.steps.events += 1;
             self.inputs.announce(self.sweeper)?;
         }
-        let mut happened = events::update(self.sweeper)?;
+        let mut happened = events::update(self.sweeper, swept)?;
         if happened.states_changed {
             self.inputs.announce(self.sweeper)?;
-            happened = events::update(self.sweeper)?;
+            happened = events::update(self.sweeper, false)?;
         }
         self.next_event = happened.next;
         // outputs of sampled FMUs are visible at once
@@ -123,23 +135,32 @@ impl Run<'_> {
 
     /// From one communication point to the next.
     fn advance(&mut self, recorder: &mut Recorder) -> Result<(), Error> {
-        if self.config.method == MethodKind::CsPece {
-            self.corrected(recorder)?;
-        } else {
-            let end = self.next_grid_point();
-            self.step_to_event_mode(end, false, false)?;
-        }
-        self.update()?;
+        self.found.clear();
+        self.found.extend_from_slice(self.sweeper.held());
+        let swept = match (self.config.method, self.config.step) {
+            (MethodKind::CsPece, None) => self.controlled().map(|()| true)?,
+            (MethodKind::CsPece, Some(step)) => {
+                self.save()?;
+                let end = self.next_grid_point(step);
+                self.correct(self.t, end).map(|()| false)?
+            }
+            (_, step) => {
+                let end = self.next_grid_point(step.unwrap_or(self.config.stop - self.config.start));
+                self.step_to_event_mode(end, false, false).map(|()| false)?
+            }
+        };
+        self.update(swept)?;
+        self.sweeper.check_bounds(self.t)?;
         self.steps.accepted += 1;
         recorder.offer(self.sweeper, &self.config, self.t)?;
         Ok(())
     }
 
     /// End of a step on the fixed grid, or the time event before it.
-    fn next_grid_point(&mut self) -> f64 {
-        let point = self.config.point(self.grid + 1, self.step);
+    fn next_grid_point(&mut self, step: f64) -> f64 {
+        let point = self.config.point(self.grid + 1, step);
         let end = self.up_to_event(point);
-        if end >= point - SAME_TIME * self.step {
+        if end >= point - SAME_TIME * step {
             self.grid += 1;
         }
         end
@@ -157,14 +178,17 @@ impl Run<'_> {
 
     /// From Event Mode over Step Mode to Event Mode at `end`; `with_kept`: with the inputs kept from the predicted end.
     fn step_to_event_mode(&mut self, end: f64, with_kept: bool, may_restore: bool) -> Result<(), RunError> {
-        let Self { sweeper, kept, t, event_wanted, .. } = self;
+        let Self { sweeper, found, kept, t, event_wanted, .. } = self;
         let mut h = end - *t;
         if *t + h < end {
             h = h.next_up(); // as the components add it, an event at the end lies inside the step
         }
-        sweeper.each(|_, instance| instance.enter_step_mode())?;
+        let of_events = |instance: &Instance| instance.has_event_mode();
+        sweeper.each(|_, i| if of_events(i) { i.enter_step_mode() } else { Ok(()) })?;
         if with_kept {
             sweeper.set_inputs(kept)?;
+        } else {
+            sweeper.set_answered(found)?;
         }
         *event_wanted = false;
         for node in 0..sweeper.instances.len() {
@@ -173,64 +197,60 @@ impl Run<'_> {
         *t = end;
         sweeper.t = end;
         sweeper.invalidate();
-        sweeper.each(|_, instance| instance.enter_event_mode())
+        sweeper.each(|_, i| if of_events(i) { i.enter_event_mode() } else { Ok(()) })?;
+        sweeper.observe_responses()
     }
 
-    /// Predicted, evaluated, corrected, evaluated; repeated with shorter steps until the error is small enough.
-    fn corrected(&mut self, recorder: &Recorder) -> Result<(), Error> {
+    fn save(&mut self) -> Result<(), RunError> {
         let saved = &mut self.saved;
-        self.sweeper.each(|node, instance| instance.save(&mut saved[node]))?;
-        let start = self.t;
+        self.sweeper.each(|node, instance| instance.save(&mut saved[node]))
+    }
+
+    /// Predicted, evaluated and, from the saved states at `start`, corrected to `end`.
+    fn correct(&mut self, start: f64, end: f64) -> Result<(), RunError> {
         let order = self.config.order;
+        self.inputs.set_all(self.sweeper, Treatment::Extrapolate, order)?;
+        self.step_to_event_mode(end, false, true)?;
+        self.sweeper.sweep()?;
+        self.keep();
+        self.restore(start)?;
+        self.inputs.set_all(self.sweeper, Treatment::Endpoint, order + 1)?;
+        self.step_to_event_mode(end, true, self.config.step.is_none())
+    }
+
+    /// A corrected step, repeated with shorter ones until the error is small enough.
+    fn controlled(&mut self) -> Result<(), RunError> {
+        self.save()?;
+        let start = self.t;
+        let limit = self.limit();
         loop {
-            let end = if self.config.step.is_some() {
-                self.next_grid_point()
-            } else {
-                self.up_to_event(self.reach(recorder))
-            };
-            let h = end - start;
-            self.inputs.set_all(self.sweeper, Treatment::Extrapolate, order)?;
-            self.step_to_event_mode(end, false, true)?;
+            let end = self.control.end(start, limit);
+            self.correct(start, end)?;
             self.sweeper.sweep()?;
-            self.keep();
-            self.restore(start)?;
-            self.inputs.set_all(self.sweeper, Treatment::Endpoint, order + 1)?;
-            self.step_to_event_mode(end, true, true)?;
-            self.sweeper.sweep()?;
-            if self.config.step.is_some() {
-                return Ok(());
-            }
             let (error, signal) = self.error();
-            #[allow(clippy::cast_precision_loss, reason = "0, 1 or 2")]
-            let exponent = -1.0 / (order as f64 + 2.0);
-            let factor = (0.9 * error.max(1e-10).powf(exponent)).clamp(0.2, 2.0);
-            if error <= 1.0 {
-                // cut short by a sample, not by the error
-                self.step = if factor >= 1.0 { self.step.max(h * factor) } else { h * factor };
+            if self.control.judge(end - start, error) {
                 return Ok(());
             }
             self.steps.rejected += 1;
-            self.step = h * factor;
-            if self.step < LEAST_STEP * (self.config.stop - self.config.start) {
+            if self.control.is_exhausted() {
                 let signal = self.sweeper.signal_name(signal).to_owned();
-                return Err(RunError::StepTooSmall { t: start, h: self.step, signal }.into());
+                return Err(RunError::StepTooSmall { t: start, h: self.control.step, signal });
             }
             self.restore(start)?;
         }
     }
 
-    /// End of a controlled step: samples and stop are communication points, no tiny rest is left.
-    fn reach(&self, recorder: &Recorder) -> f64 {
-        let far = self.t + 2.0 * self.step;
-        let limit = recorder.due_before(&self.config, far).unwrap_or(self.config.stop).min(self.config.stop);
-        let remaining = limit - self.t;
-        if self.step >= remaining {
-            limit
-        } else if 2.0 * self.step > remaining {
-            self.t + 0.5 * remaining
-        } else {
-            self.t + self.step
+    /// The next sample, time event or stop: where a controlled step ends at the latest.
+    fn limit(&mut self) -> f64 {
+        let mut limit = self.config.stop;
+        if let Some(interval) = self.config.interval {
+            while self.config.point(self.sample, interval) <= self.t + SAME_TIME * interval && self.t < limit
+            {
+                self.sample += 1;
+            }
+            limit = self.config.point(self.sample, interval);
         }
+        self.up_to_event(limit)
     }
 
     fn keep(&mut self) {
@@ -257,7 +277,7 @@ impl Run<'_> {
         for (&signal, &predicted) in self.sweeper.motion.iter().zip(&self.predicted) {
             let value = self.sweeper.values[signal];
             let scale = self.config.atol + self.config.rtol * value.abs();
-            let error = (value - predicted).abs() / scale / 3.0;
+            let error = ESTIMATE * (value - predicted).abs() / scale;
             if error.is_nan() || error > worst.0 {
                 worst = (error, signal);
             }

@@ -16,14 +16,19 @@ pub(super) struct Happened {
     pub(super) next: Option<f64>,
 }
 
-/// In Event Mode: sweep and update discrete states until no FMU asks for more.
-pub(super) fn update(sweeper: &mut Sweeper) -> Result<Happened, RunError> {
+/// In Event Mode: sweep and update discrete states until no FMU asks for more; `swept`: the first sweep has been done.
+pub(super) fn update(sweeper: &mut Sweeper, swept: bool) -> Result<Happened, RunError> {
     let mut happened = Happened::default();
-    for _ in 0..MAX_PASSES {
-        sweeper.sweep()?;
+    for pass in 0..MAX_PASSES {
+        if pass > 0 || !swept {
+            sweeper.sweep()?;
+        }
         let mut again = false;
         happened.next = None;
         for node in 0..sweeper.instances.len() {
+            if !sweeper.instances[node].has_event_mode() {
+                continue;
+            }
             let update = sweeper.instances[node].update_discrete_states();
             let update = update.map_err(|fault| sweeper.failed(node, fault))?;
             if update.terminate {

@@ -6,6 +6,7 @@ mod events;
 mod exchange;
 mod inputs;
 mod settings;
+mod step_control;
 
 pub(crate) use common::{Run, RunState};
 pub use settings::{Choices, Config, MethodKind, integrator_name};
@@ -77,9 +78,13 @@ pub fn run(
     recorder: &mut Recorder,
     progress: Progress<'_>,
 ) -> Result<Steps, Error> {
-    match config.method {
+    let result = match config.method {
         MethodKind::Common => common::run(sweeper, config, recorder, progress),
         MethodKind::CsPredict | MethodKind::CsPece => cosimulation::run(sweeper, config, recorder, progress),
         MethodKind::Jacobi | MethodKind::Seidel => exchange::run(sweeper, config, recorder, progress),
-    }
+    };
+    result.map_err(|error| match error {
+        Error::Run(failed) => Error::Run(sweeper.explained(failed)),
+        other => other,
+    })
 }

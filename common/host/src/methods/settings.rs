@@ -32,11 +32,13 @@ const METHODS: [(&str, MethodKind); 5] = [
 ];
 
 /// Names of the integrators of method `common`.
-const INTEGRATORS: [(&str, Integrator); 4] = [
+const INTEGRATORS: [(&str, Integrator); 6] = [
     ("heun", Integrator::Heun),
     ("rk4", Integrator::Rk4),
     ("dopri5", Integrator::Dopri5),
     ("dop853", Integrator::Dop853),
+    ("rodas4", Integrator::Rodas4),
+    ("radau5", Integrator::Radau5),
 ];
 
 impl MethodKind {
@@ -171,6 +173,10 @@ impl Config {
         }
         if !(0..=2).contains(&self.order) {
             let wanted = "it must be 0, 1 or 2".into();
+            return Err(SceneError::Setting { name: "order", value: self.order.to_string(), wanted });
+        }
+        if self.method == MethodKind::CsPece && self.order == 0 {
+            let wanted = "cs-pece has k = 1 or 2".into();
             return Err(SceneError::Setting { name: "order", value: self.order.to_string(), wanted });
         }
         if self.method != MethodKind::CsPece && self.is_fixed_step() && self.step.is_none() {

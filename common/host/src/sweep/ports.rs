@@ -2,6 +2,7 @@
 
 use super::Sweeper;
 use crate::error::RunError;
+use crate::import::{Fault, Status};
 use crate::scene::{Network, Source};
 
 /// Signals beyond this multiple of their nominal value have run away.
@@ -35,12 +36,14 @@ impl Sweeper {
     /// # Errors
     /// A call that fails.
     pub fn set_inputs(&mut self, values: &[f64]) -> Result<(), RunError> {
-        for node in 0..self.ports.len() {
-            self.scratch.clear();
-            self.scratch.extend(self.ports[node].sinks.iter().map(|&sink| values[sink]));
-            self.push(node)?;
-        }
-        Ok(())
+        (0..self.ports.len()).try_for_each(|node| self.set_inputs_of(node, values))
+    }
+
+    /// The same for one component.
+    pub(super) fn set_inputs_of(&mut self, node: usize, values: &[f64]) -> Result<(), RunError> {
+        self.scratch.clear();
+        self.scratch.extend(self.ports[node].sinks.iter().map(|&sink| values[sink]));
+        self.push(node)
     }
 
     /// Reads all signals of a component.
@@ -72,6 +75,20 @@ impl Sweeper {
                 Err(RunError::Diverged { t, signal: self.signal_names[signal].clone(), value })
             }
             None => Ok(()),
+        }
+    }
+
+    /// The same error, or divergence as its cause: an FMU refuses values before they reach the bound here.
+    pub(crate) fn explained(&self, error: RunError) -> RunError {
+        let RunError::Call { t, fault: Fault { status: Status::Discard, .. }, .. } = error else {
+            return error;
+        };
+        match self.values.iter().position(|value| value.is_nan() || value.abs() >= RUN_AWAY) {
+            Some(signal) => {
+                let value = self.values[signal];
+                RunError::Diverged { t, signal: self.signal_names[signal].clone(), value }
+            }
+            None => error,
         }
     }
 

@@ -3,34 +3,34 @@
 use crate::Complex;
 use crate::lu::Lu;
 
-pub(super) type Square = [[f64; 3]; 3];
+pub(crate) type Square = [[f64; 3]; 3];
 
 pub(super) const SQRT_6: f64 = 2.449_489_742_783_178;
-pub(super) const A: Square = [
+pub(crate) const A: Square = [
     [(88.0 - 7.0 * SQRT_6) / 360.0, (296.0 - 169.0 * SQRT_6) / 1800.0, (-2.0 + 3.0 * SQRT_6) / 225.0],
     [(296.0 + 169.0 * SQRT_6) / 1800.0, (88.0 + 7.0 * SQRT_6) / 360.0, (-2.0 - 3.0 * SQRT_6) / 225.0],
     [(16.0 - SQRT_6) / 36.0, (16.0 + SQRT_6) / 36.0, 1.0 / 9.0],
 ];
-pub(super) const C: [f64; 3] = [(4.0 - SQRT_6) / 10.0, (4.0 + SQRT_6) / 10.0, 1.0];
+pub(crate) const C: [f64; 3] = [(4.0 - SQRT_6) / 10.0, (4.0 + SQRT_6) / 10.0, 1.0];
 /// Weights of the error estimate: `gamma_0 (b - embedded)` on the stages `z`, `gamma_0 = 1/gamma`, times `gamma`.
-pub(super) const E: [f64; 3] = [-(13.0 + 7.0 * SQRT_6) / 3.0, (-13.0 + 7.0 * SQRT_6) / 3.0, -1.0 / 3.0];
+pub(crate) const E: [f64; 3] = [-(13.0 + 7.0 * SQRT_6) / 3.0, (-13.0 + 7.0 * SQRT_6) / 3.0, -1.0 / 3.0];
 
 /// Eigenvalues of the inverse of `A`.
-pub(super) const GAMMA: f64 = 3.637_834_252_744_496;
-pub(super) const ALPHA_BETA: Complex = Complex::new(2.681_082_873_627_752_3, 3.050_430_199_247_410_5);
+pub(crate) const GAMMA: f64 = 3.637_834_252_744_496;
+pub(crate) const ALPHA_BETA: Complex = Complex::new(2.681_082_873_627_752_3, 3.050_430_199_247_410_5);
 /// Its eigenvectors: real, and real and imaginary part.
-pub(super) const T: Square = [
+pub(crate) const T: Square = [
     [0.091_232_394_870_892_95, -0.141_255_295_020_954_2, -0.030_029_194_105_147_424],
     [0.241_717_932_707_107, 0.204_129_352_293_799_94, 0.382_942_112_757_261_9],
     [0.966_048_182_615_093, 1.0, 0.0],
 ];
-pub(super) const T_INVERSE: Square = [
+pub(crate) const T_INVERSE: Square = [
     [4.325_579_890_063_155, 0.339_199_251_815_809_84, 0.541_770_539_935_874_9],
     [-4.178_718_591_551_905, -0.327_682_820_761_062_37, 0.476_623_554_500_550_44],
     [-0.502_872_634_945_786_8, 2.571_926_949_855_605, -0.596_039_204_828_224_9],
 ];
 /// `z(theta) = sum_p theta^(p+1) sum_i POWERS_pi z_i` runs through the stages: the collocation polynomial.
-pub(super) const POWERS: Square = powers_of_theta();
+pub(crate) const POWERS: Square = powers_of_theta();
 
 /// Inverse of the matrix with the rows `(c_i, c_i^2, c_i^3)`, by Lagrange's polynomials with the node 0.
 const fn powers_of_theta() -> Square {

@@ -7,6 +7,7 @@ use model::{
 };
 use serde::{Deserialize, Serialize};
 
+use crate::min_jerk::{MinJerk, Moved, next_of};
 use crate::port::{ScalarSlot, Slot, slots};
 
 /// How a coordinate moves
@@ -196,13 +197,6 @@ struct Law {
     phase: f64,
 }
 
-/// Position, velocity and acceleration.
-struct Moved<S> {
-    r: S,
-    v: S,
-    a: S,
-}
-
 impl Law {
     fn at<S: Scalar>(&self, t: S) -> Moved<S> {
         let zero = S::lift(0.0);
@@ -213,29 +207,19 @@ impl Law {
                 let (v, a) = (self.amplitude * self.omega, self.amplitude * self.omega * self.omega);
                 Moved { r: sin * self.amplitude + self.start, v: cos * v, a: -(sin * a) }
             }
-            GuideKind::MinJerk => {
-                let tau = (t - self.t0) / self.duration;
-                if tau.re() <= 0.0 {
-                    return Moved { r: S::lift(self.start), v: zero, a: zero };
-                }
-                if tau.re() >= 1.0 {
-                    return Moved { r: S::lift(self.end), v: zero, a: zero };
-                }
-                let way = self.end - self.start;
-                let (left, square) = (-tau + 1.0, tau * tau);
-                Moved {
-                    r: square * tau * (tau * (tau * 6.0 - 15.0) + 10.0) * way + self.start,
-                    v: square * left * left * (30.0 * way / self.duration),
-                    a: tau * left * (tau * -2.0 + 1.0) * (60.0 * way / (self.duration * self.duration)),
-                }
-            }
+            GuideKind::MinJerk => self.min_jerk().at(t),
         }
+    }
+
+    fn min_jerk(&self) -> MinJerk {
+        let Self { start, end, t0, duration, .. } = *self;
+        MinJerk { start, end, t0, duration }
     }
 
     /// Times at which the jerk jumps.
     fn kinks(&self) -> [f64; 2] {
         match self.kind {
-            GuideKind::MinJerk => [self.t0, self.t0 + self.duration],
+            GuideKind::MinJerk => self.min_jerk().kinks(),
             GuideKind::Sine | GuideKind::Rest => [f64::INFINITY; 2],
         }
     }
@@ -280,7 +264,7 @@ impl Guide {
     /// The first kink after `t`.
     fn next_kink(&self, t: f64) -> f64 {
         let laws = self.P.iter().chain(std::iter::once(&self.H));
-        laws.flat_map(Law::kinks).filter(|kink| *kink > t).fold(f64::INFINITY, f64::min)
+        next_of(laws.flat_map(Law::kinks), t)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use integrators::{DynamicOde, ExplicitSolver, ExplicitState, Settings, Statistics};
+use integrators::{DynamicOde, DynamicSolver, DynamicState, Settings, Statistics};
 use serde::{Deserialize, Serialize};
 
 use super::{Whole, integrator, refused};
@@ -28,7 +28,7 @@ struct Ahead {
 /// A run between two steps of the integrator.
 pub(crate) struct Run {
     ranges: Vec<Range<usize>>,
-    pub(super) solver: ExplicitSolver,
+    pub(super) solver: DynamicSolver,
     /// How far the steps count [s]
     pub(crate) t: f64,
     x: Vec<f64>,
@@ -61,7 +61,7 @@ pub(crate) struct RunState {
     grid: u64,
     events: u64,
     ahead: Option<Ahead>,
-    solver: ExplicitState,
+    solver: DynamicState,
 }
 
 /// Consecutive ranges of given lengths.
@@ -78,7 +78,7 @@ fn ranges(lengths: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
 impl Run {
     /// Begins a run; the FMUs have been initialised.
     pub(crate) fn start(sweeper: &mut Sweeper, config: &Config) -> Result<Self, Error> {
-        let happened = events::update(sweeper)?;
+        let happened = events::update(sweeper, false)?;
         sweeper.each(|_, instance| instance.enter_continuous_time_mode())?;
         let mut run = Self::of(sweeper, config)?;
         run.next_event = happened.next;
@@ -121,7 +121,7 @@ impl Run {
             atol: config.atol,
         };
         Ok(Self {
-            solver: ExplicitSolver::new(settings, nominal).map_err(refused)?,
+            solver: DynamicSolver::new(settings, nominal).map_err(refused)?,
             before: sweeper.values.clone(),
             ranges: state_ranges,
             t: config.start,
@@ -187,7 +187,7 @@ impl Run {
 
     /// Counters of the integrator.
     pub(crate) fn statistics(&self) -> Statistics {
-        self.solver.statistics
+        self.solver.statistics()
     }
 
     /// How far the equations are solved, whether the last step counts or not [s].
@@ -336,12 +336,13 @@ impl Run {
 
     /// Carries out the event and goes on with Continuous-Time Mode.
     pub(crate) fn leave_event_mode(&mut self, sweeper: &mut Sweeper) -> Result<(), Error> {
-        let happened = events::update(sweeper)?;
+        let happened = events::update(sweeper, false)?;
         // states may have jumped: all signals once more
         sweeper.sweep()?;
         sweeper.each(|_, instance| instance.enter_continuous_time_mode())?;
         self.next_event = happened.next;
-        let jumped = self.before.iter().zip(&sweeper.values).any(|(a, b)| a.to_bits() != b.to_bits());
+        // a zero that changes its sign is no jump
+        let jumped = self.before.iter().zip(&sweeper.values).any(|(a, b)| (a - b).abs() > 0.0);
         if happened.states_changed {
             Whole { sweeper, ranges: &self.ranges }.fetch(&mut self.x)?;
         }
