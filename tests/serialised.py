@@ -26,7 +26,7 @@ def tunable(fmu):
     """A tunable parameter and another value for it."""
     for variable in fmu.variables.values():
         if (variable.causality, variable.variability, variable.type) == ("parameter", "tunable", "Float64"):
-            return {variable.name: float(variable.start) + 0.5}
+            return {variable.name: max(float(variable.start), 0.0) + 0.5}  # -1 may stand for another source
     return {}
 
 

@@ -16,7 +16,7 @@ from .fmu import Fmu, Result
 #: What `documentation/fmi-ls-ref.txt` promises.
 TIGHT = {"solver.method": "dop853", "solver.rtol": 1e-12, "solver.atol": 1e-15}
 #: FMUs that do not offer dop853: the method instead; one without states has no integration error.
-METHODS = {"effi_plant": "dopri5", "effi_controller": "rk4"}
+METHODS = {"boom": "dopri5", "effi_plant": "dopri5", "effi_controller": "rk4"}
 #: Rows of a file, at most.
 ROWS = 251
 
@@ -24,6 +24,13 @@ ROWS = 251
 def shaken(t: float) -> list[float]:
     """Position, velocity and acceleration of A.z: 1 mm at 20 rad/s."""
     return [1e-3 * np.sin(20.0 * t), 0.02 * np.cos(20.0 * t), -0.4 * np.sin(20.0 * t)]
+
+
+def commands(t: float) -> list[float]:
+    """Commands of the six joints [rad/s]: raise the folded boom, slew and open arm 3, open the rest."""
+    if t < 60.0:
+        return [0.0, 0.02, 0.0, 0.0, 0.0, 0.0]
+    return [0.03, 0.02, 0.01, 0.0, 0.0, 0.0] if t < 120.0 else [0.0, 0.0, 0.05, -0.05, 0.05, -0.05]
 
 
 def pressed(t: float) -> list[float]:
@@ -43,6 +50,7 @@ def shaken_axis(t: float) -> list[float]:
 
 #: FMUs that do nothing with inputs at rest: names and law of the inputs.
 INPUTS: dict[str, tuple[list[str], Callable[[float], list[float]]]] = {
+    "boom": ([f"joint[{i}].velocity_command" for i in range(1, 7)], commands),
     "bushing": (["A.r.z", "A.v.z", "A.a.z"], shaken),
     "virtual_wall": (["A.r.z", "A.v.z"], pressed),
     "operator_arm": (["H.r.z", "H.v.z"], shaken_handle),

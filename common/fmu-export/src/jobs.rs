@@ -100,6 +100,9 @@ impl<M: Model> Visitor<M> for EventIndicators<'_, M> {
     type Output = ();
     fn visit<const N: usize, const Z: usize, Y: System<N, Z, Model = M>>(self, system: &Y) {
         let x: [f64; N] = std::array::from_fn(|i| self.x[i]);
+        if self.values.is_empty() {
+            return; // a Co-Simulation FMU need not show them
+        }
         let indicators = system.indicators(self.t, &x, &M::Inputs::<f64>::load(self.u), self.d);
         self.values.fill(1.0);
         self.values[..Z].copy_from_slice(&indicators);

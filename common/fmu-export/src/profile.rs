@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use model::{Documentation, Experiment, Model};
 
+use crate::solver::{SolverMethod, method_name};
 use crate::table::{Layout, Part};
 
 /// What is said about an FMU besides its variables.
@@ -29,6 +30,15 @@ pub struct Profile<'a> {
     pub parameters: Range<usize>,
     /// Write-up, icon and reference run
     pub documentation: Documentation,
+    /// Method of the reference run
+    pub reference_method: &'static str,
+}
+
+/// `dop853`, where that is not on offer `dopri5`, otherwise the first one.
+fn reference_method(offered: &[i64]) -> &'static str {
+    let wanted = [SolverMethod::Dop853 as i64, SolverMethod::Dopri5 as i64];
+    let best = wanted.into_iter().find(|method| offered.contains(method));
+    best.or(offered.first().copied()).map_or("", method_name)
 }
 
 impl Profile<'static> {
@@ -45,6 +55,7 @@ impl Profile<'static> {
             directional_derivatives: true,
             parameters: Layout::<M>::PARAMETERS,
             documentation: M::DOCUMENTATION,
+            reference_method: reference_method(M::METHODS),
         }
     }
 }

@@ -32,10 +32,11 @@ pub(crate) fn description(profile: &Profile<'_>) -> String {
     };
     format!(
         "Default experiment ({} to {} s, step {} s) with all parameters at their defaults and {inputs}, computed with \
-         solver.method = dop853, solver.rtol = 1e-12, solver.atol = 1e-15, written with 12 digits.",
+         solver.method = {}, solver.rtol = 1e-12, solver.atol = 1e-15, written with 12 digits.",
         number(profile.start),
         number(profile.experiment.stop),
         number(profile.experiment.step),
+        profile.reference_method,
     )
 }
 

@@ -325,7 +325,7 @@ fn hash(model: &str, variables: &[Variable]) -> u128 {
             t.items.iter().for_each(|i| hash.write(i.name.as_bytes()));
         }
         hash.write(format!("{:?}{:?}{:?}", entry.causality, entry.variability, entry.initial).as_bytes());
-        for value in [entry.start, entry.min, entry.max, entry.nominal] {
+        for value in [entry.start, entry.min, entry.max, entry.nominal].into_iter().chain(entry.or) {
             hash.write(&value.to_bits().to_le_bytes());
         }
         entry.depends.iter().for_each(|d| hash.write(d.as_bytes()));
@@ -383,13 +383,14 @@ pub fn allowed(entry: &Entry) -> String {
         return "0 or 1".into();
     }
     let above = entry.min > 0.0 && entry.min <= f64::MIN_POSITIVE;
-    match (entry.min.is_finite(), entry.max.is_finite()) {
+    let range = match (entry.min.is_finite(), entry.max.is_finite()) {
         (true, false) if above => format!("> 0 {}, finite", entry.unit),
         (true, false) => format!(">= {} {}, finite", entry.min, entry.unit),
         (false, true) => format!("<= {} {}, finite", entry.max, entry.unit),
         (true, true) => format!("{} .. {} {}", entry.min, entry.max, entry.unit),
         (false, false) => "finite".to_string(),
-    }
+    };
+    entry.or.map_or(range.clone(), |or| format!("{range}, or {or}"))
 }
 
 /// True if the variable may be changed between steps.

@@ -57,8 +57,13 @@ impl<M: Model> Instance<M> {
         is: impl Fn(Kind) -> bool,
         mut put: impl FnMut(usize, f64) -> bool,
     ) -> Result<(), Fault> {
+        let mut needed = 0;
         for reference in references {
             self.table.typed(*reference, self.state.interface.standard(), called, &is)?;
+            needed |= self.table.access[*reference as usize];
+        }
+        if self.state.phase != Phase::Instantiated {
+            self.refresh(needed & ALL_PARTS)?;
         }
         for (i, reference) in references.iter().enumerate() {
             let value = self.state.values[*reference as usize];
@@ -232,5 +237,5 @@ fn in_range(entry: &Entry, value: f64) -> bool {
     if entry.switch {
         return value == 0.0 || value == 1.0;
     }
-    value.is_finite() && value >= entry.min && value <= entry.max
+    entry.any || entry.or == Some(value) || value.is_finite() && value >= entry.min && value <= entry.max
 }

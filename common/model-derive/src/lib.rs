@@ -13,8 +13,10 @@
 //! ```
 //!
 //! Keys of `var`: `name`, `prefix`, `start` (a value, or `[x, y, z]`), `item` (an enumeration's
-//! variant), `min`, `max`, `above` (exclusive lower bound), `nominal`, `unit`, `tunable`,
-//! `discrete`, `switch` (0 or 1), `local`, `sampled` and `not_affine` (of a port), `exact`, `approx`, `state`, `depends` and, for the time derivative of a state,
+//! variant), `min`, `max`, `above` (exclusive lower bound), `or` (a value out of the range that is allowed too), `any`
+//! (values need not be finite), `nominal`, `unit`, `tunable`, `discrete`, `switch` (0 or 1), `local`, `calculated` (a
+//! parameter), `sampled` and `not_affine` (of a port), `exact`, `approx`, `state`, `depends` and, for the time derivative
+//! of a state,
 //! `rate_depends`: names or prefixes of inputs and states, as one list `["a", "b"]`, the name of a
 //! constant of type `&[&str]`, or a list of such lists, one per component. `P.a.@` stands for the same component
 //! of P.a, `P.a.*` for all components without a scalar P.a, `=P.a` for that scalar alone.
@@ -77,11 +79,14 @@ struct FieldAttributes {
     start: Vec<Tokens>,
     min: Option<Tokens>,
     max: Option<Tokens>,
+    or: Option<Tokens>,
+    any: bool,
     nominal: Option<Tokens>,
     tunable: bool,
     discrete: bool,
     switch: bool,
     local: bool,
+    calculated: bool,
     port: Option<&'static str>,
     initial: Option<&'static str>,
     state: bool,
@@ -139,6 +144,8 @@ fn field_attributes(field: &Field) -> syn::Result<FieldAttributes> {
                 "discrete" => a.discrete = true,
                 "switch" => a.switch = true,
                 "local" => a.local = true,
+                "calculated" => a.calculated = true,
+                "any" => a.any = true,
                 "sampled" => a.port = Some("Sampled"),
                 "not_affine" => a.port = Some("NotAffine"),
                 "exact" => a.initial = Some("Exact"),
@@ -156,11 +163,12 @@ fn field_attributes(field: &Field) -> syn::Result<FieldAttributes> {
                         e => vec![number(e)],
                     };
                 }
-                "min" | "max" | "nominal" | "above" => {
+                "min" | "max" | "or" | "nominal" | "above" => {
                     let e = number(&meta.value()?.parse()?);
                     match key.as_str() {
                         "min" => a.min = Some(e),
                         "max" => a.max = Some(e),
+                        "or" => a.or = Some(e),
                         "nominal" => a.nominal = Some(e),
                         // the smallest normal number above an exclusive bound of zero
                         _ => a.min = Some(quote!((#e) + f64::MIN_POSITIVE)),
@@ -240,10 +248,12 @@ fn field_tokens(
     let (depends, rate_depends) = (&a.depends, &a.rate_depends);
     let rate_unit = a.state.then(|| per_second(&unit)).map(|u| quote!(#u));
     let rate_unit = option(rate_unit.as_ref());
-    let field_causality = format_ident!("{}", if a.local { "Local" } else { causality });
+    let own = [(a.local, "Local"), (a.calculated, "CalculatedParameter")].into_iter().find(|(own, _)| *own);
+    let field_causality = format_ident!("{}", own.map_or(causality, |(_, own)| own));
     let port = format_ident!("{}", a.port.unwrap_or("Regular"));
     let initial = format_ident!("{}", a.initial.unwrap_or("Calculated"));
     let (min, max, nominal) = (option(a.min.as_ref()), option(a.max.as_ref()), option(a.nominal.as_ref()));
+    let (or, any) = (option(a.or.as_ref()), a.any);
     Ok(FieldTokens {
         length: quote!(#table.len()),
         fill: quote! {
@@ -260,6 +270,8 @@ fn field_tokens(
                 start: &[#(#start),*],
                 min: #min,
                 max: #max,
+                or: #or,
+                any: #any,
                 nominal: #nominal,
                 depends: &[#(#depends),*],
                 rate_unit: #rate_unit,

@@ -15,6 +15,18 @@ pub enum EvaluationError {
         /// Its smallest usable value
         limit: f64,
     },
+    /// An input that the equations have no value for, although each number by itself is in its range.
+    #[error("{variable} {problem}: {value:.6e}; allowed: {allowed}")]
+    Input {
+        /// Name of the input or its group
+        variable: &'static str,
+        /// What is wrong
+        problem: &'static str,
+        /// The value that shows it
+        value: f64,
+        /// What would be accepted
+        allowed: &'static str,
+    },
     /// A state has grown beyond what the equations can square.
     #[error("{variable} = {value:.3e} is too large; allowed: |{variable}| <= {limit:.0e}")]
     TooLarge {

@@ -163,6 +163,17 @@ pub trait System<const N: usize, const Z: usize> {
         *d
     }
 
+    /// Discrete states at the start of a communication step under its inputs; may change `x`, e.g. bring a coordinate
+    /// onto the stop at which it rests.
+    fn settle(
+        &self,
+        _x: &mut [f64; N],
+        _u: &<Self::Model as Model>::Inputs<f64>,
+        d: &<Self::Model as Model>::Discrete,
+    ) -> <Self::Model as Model>::Discrete {
+        *d
+    }
+
     /// Time derivative of the states.
     ///
     /// # Errors
@@ -248,6 +259,16 @@ pub trait System<const N: usize, const Z: usize> {
         _d: &<Self::Model as Model>::Discrete,
     ) -> Pace {
         Pace { stiff: false, span: f64::INFINITY }
+    }
+
+    /// How long a step of an adaptive method may be now [s], for rates with kinks that its error estimate may not see.
+    fn longest_step(
+        &self,
+        _x: &[f64; N],
+        _u: &<Self::Model as Model>::Inputs<f64>,
+        _d: &<Self::Model as Model>::Discrete,
+    ) -> f64 {
+        f64::INFINITY
     }
 
     /// How the equations are linear now, for `solver.method = exact`; otherwise another method takes the step.

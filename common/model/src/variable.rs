@@ -44,6 +44,8 @@ pub enum Causality {
     Inherit,
     /// Constant of a run, given by the user
     Parameter,
+    /// Constant of a run, computed from parameters
+    CalculatedParameter,
     /// Given by other systems
     Input,
     /// Computed, meant for others
@@ -109,6 +111,10 @@ pub struct Entry {
     pub min: f64,
     /// Largest allowed value
     pub max: f64,
+    /// A value out of the range that is allowed too: it stands for another source of the value
+    pub or: Option<f64>,
+    /// Any value may be set, also one that is not finite
+    pub any: bool,
     /// Typical magnitude
     pub nominal: f64,
     /// Takes 0 and 1 only
@@ -133,6 +139,7 @@ pub struct Rate {
 
 /// What a field's attributes say about its variables; `None` and empty leave things as they are.
 #[derive(Debug, Clone, Copy)]
+#[allow(clippy::struct_excessive_bools, reason = "marks that have nothing to do with each other")]
 pub struct Attributes {
     /// Comes before the names of the field's own variables
     pub prefix: &'static str,
@@ -158,6 +165,10 @@ pub struct Attributes {
     pub min: Option<f64>,
     /// Largest allowed value
     pub max: Option<f64>,
+    /// A value out of the range that is allowed too
+    pub or: Option<f64>,
+    /// Any value may be set, also one that is not finite
+    pub any: bool,
     /// Typical magnitude
     pub nominal: Option<f64>,
     /// Inputs and states that the value depends on directly: none, one list for all, or one per component
@@ -199,6 +210,8 @@ impl Entry {
             start: 0.0,
             min: f64::NEG_INFINITY,
             max: f64::INFINITY,
+            or: None,
+            any: false,
             nominal: 1.0,
             switch: false,
             depends: &[],
@@ -241,7 +254,7 @@ impl Entry {
             || !matches!(self.kind, Kind::Float64) && matches!(self.causality, Causality::Local)
         {
             self.variability = Variability::Discrete;
-        } else if matches!(self.causality, Causality::Parameter)
+        } else if matches!(self.causality, Causality::Parameter | Causality::CalculatedParameter)
             && matches!(self.variability, Variability::Continuous)
         {
             self.variability = Variability::Fixed;
@@ -266,6 +279,10 @@ impl Entry {
         if let Some(max) = a.max {
             self.max = max;
         }
+        if a.or.is_some() {
+            self.or = a.or;
+        }
+        self.any |= a.any;
         if let Some(nominal) = a.nominal {
             self.nominal = nominal;
         }

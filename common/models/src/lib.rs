@@ -4,6 +4,7 @@
 #![allow(non_snake_case, reason = "names are the papers' symbols: F_A, M, q_ddot")]
 
 pub mod absorber;
+pub mod boom;
 pub mod effi;
 pub mod force_law;
 mod min_jerk;

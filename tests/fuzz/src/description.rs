@@ -35,6 +35,34 @@ pub(crate) enum Initial {
     Calculated,
 }
 
+/// What the description of a variable says about its range in words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Range {
+    /// Nothing
+    Declared,
+    /// "one that is not finite acts as": every value is taken
+    Any,
+    /// "> 0; -1:" or ">= 0; -1:": -1 stands for another source
+    MinusOneOr {
+        /// 0 is taken
+        zero: bool,
+    },
+}
+
+impl Range {
+    fn of(description: &str) -> Self {
+        if description.contains("not finite acts as") {
+            Self::Any
+        } else if description.contains("> 0; -1:") {
+            Self::MinusOneOr { zero: false }
+        } else if description.contains(">= 0; -1:") {
+            Self::MinusOneOr { zero: true }
+        } else {
+            Self::Declared
+        }
+    }
+}
+
 /// A variable; its value reference is its place in the list.
 #[derive(Debug, Clone)]
 #[allow(clippy::struct_excessive_bools, reason = "attributes of the description")]
@@ -47,6 +75,8 @@ pub(crate) struct Variable {
     pub(crate) initial: Initial,
     pub(crate) min: Option<f64>,
     pub(crate) max: Option<f64>,
+    /// What the text says about the range besides
+    pub(crate) range: Range,
     pub(crate) start: Option<f64>,
     /// Items of an enumeration: name and value
     pub(crate) items: Vec<(String, i64)>,
@@ -66,9 +96,16 @@ impl Variable {
         if self.is_switch() {
             return value == 0.0 || value == 1.0;
         }
-        value.is_finite()
+        let declared = value.is_finite()
             && self.min.is_none_or(|min| value >= min)
-            && self.max.is_none_or(|max| value <= max)
+            && self.max.is_none_or(|max| value <= max);
+        match self.range {
+            Range::Declared => declared,
+            Range::Any => true,
+            Range::MinusOneOr { zero } => {
+                declared && (value == -1.0 || value >= if zero { 0.0 } else { f64::MIN_POSITIVE })
+            }
+        }
     }
 
     /// A discrete number from 0 to 1 is a switch: inputs are Float64 for all hosts, Boolean ones too.
@@ -252,6 +289,7 @@ fn variable(element: &str, a: &Attributes, types: &HashMap<String, Vec<(String, 
         initial,
         min: number("min"),
         max: number("max"),
+        range: Range::of(&text(a, "description")),
         start,
         items: types.get(&text(a, "declaredType")).cloned().unwrap_or_default(),
         state: false,

@@ -2,7 +2,7 @@
 
 use crate::api::{Inquiry, Lists, Transition};
 use crate::call::{Access, Action, At, Call, Mutation, Spoil};
-use crate::description::{Causality, Description, Kind, Variable};
+use crate::description::{Causality, Description, Kind, Range, Variable};
 use crate::machine::{SLOTS, STORES};
 use crate::random::Random;
 use crate::standard::{self, Function, Interface, Phase, Version};
@@ -387,9 +387,15 @@ impl Generator<'_> {
         let bounds = [variable.min, variable.max].into_iter().flatten().collect::<Vec<_>>();
         match self.random.below(10) {
             _ if !odd && variable.causality == Causality::Input => 10.0 * self.random.unit(),
+            _ if !odd && matches!(variable.range, Range::MinusOneOr { .. }) => {
+                let own = 1e-3 + 0.1 * self.random.unit().abs();
+                self.random.pick(&[-1.0, own])
+            }
             _ if !odd => {
                 let value = start * (1.0 + 0.1 * self.random.unit());
-                value.clamp(variable.min.unwrap_or(value), variable.max.unwrap_or(value))
+                let (min, max) =
+                    (variable.min.unwrap_or(f64::NEG_INFINITY), variable.max.unwrap_or(f64::INFINITY));
+                value.clamp(min, max)
             }
             0..3 if !bounds.is_empty() => self.random.pick(&bounds),
             3 => f64::from_bits(self.random.bits()),

@@ -391,6 +391,11 @@ impl<'a> Machine<'a> {
                 Verdict::Allowed if self.treatment_is_unfit(known) => Expected::error(),
                 Verdict::Allowed => expected.or(DISCARD),
             };
+            // a value that is taken although it makes no sense may be worth a warning
+            let any = known.values.iter().any(|value| !value.is_finite());
+            if any && expected.allows(OK) {
+                expected = expected.or(WARNING);
+            }
         }
         if null.is_some() {
             expected = Expected::error();
@@ -405,7 +410,7 @@ impl<'a> Machine<'a> {
                 known.time, stepped.last
             ));
         }
-        if status != OK {
+        if status != OK && status != WARNING {
             return Ok((Record { status, data: Vec::new() }, expected));
         }
         let events = known.interface == Interface::CoSimulationWithEvents;

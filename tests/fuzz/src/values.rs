@@ -6,7 +6,7 @@ use fmi_capi::{DISCARD, ERROR, OK};
 
 use crate::api::{Array, Lists};
 use crate::call::{Access, Mutation, Spoil};
-use crate::description::{Causality, Kind, Variable};
+use crate::description::{Causality, Kind, Range, Variable};
 use crate::expect::{Expected, Offence};
 use crate::machine::{Answer, Machine, Record};
 use crate::random::Random;
@@ -175,7 +175,7 @@ impl Machine<'_> {
             return Ok(());
         };
         let (name, value) = (&variable.name, access.number(bits));
-        if !value.is_finite() {
+        if !value.is_finite() && variable.range != Range::Any {
             return Err(format!("{name} is {value} after OK"));
         }
         if access == Access::Boolean && bits > 1 {
@@ -188,7 +188,7 @@ impl Machine<'_> {
         } else {
             return Ok(());
         };
-        if (value - expected).abs() > 0.0 {
+        if (value - expected).abs() > 0.0 || value.is_finite() != expected.is_finite() {
             return Err(format!("{name} is {value}, but {expected} was set"));
         }
         Ok(())

@@ -146,6 +146,7 @@ fn default_experiment(xml: &mut Xml, profile: &Profile<'_>) -> io::Result<()> {
 fn identity(reference: usize, Variable { name, entry, .. }: &Variable) -> Attributes {
     let causality = match entry.causality {
         Causality::Parameter => "parameter",
+        Causality::CalculatedParameter => "calculatedParameter",
         Causality::Input => "input",
         Causality::Output => "output",
         Causality::Local => "local",
@@ -181,7 +182,8 @@ fn typed(variable: &Variable, derivative: Option<usize>, is_state: bool) -> Attr
         Kind::Float64 => attributes.push(("unit", unit_name(entry.unit).into())),
         _ => {}
     }
-    for (name, value) in [("min", entry.min), ("max", entry.max)] {
+    let or = |bound: f64, pick: fn(f64, f64) -> f64| entry.or.map_or(bound, |or| pick(bound, or));
+    for (name, value) in [("min", or(entry.min, f64::min)), ("max", or(entry.max, f64::max))] {
         if value.is_finite() {
             attributes.push((name, number(value)));
         }
@@ -220,7 +222,9 @@ impl Unknowns {
         let all = || 0..table.variables.len();
         let outputs: Vec<_> = all().filter(|i| of(i).entry.causality == Causality::Output).collect();
         let derivatives: Vec<_> = all().filter(|i| of(i).derivative_of.is_some()).collect();
-        let mut initial = [&outputs[..], &table.states, &derivatives].concat();
+        let calculated: Vec<_> =
+            all().filter(|i| of(i).entry.causality == Causality::CalculatedParameter).collect();
+        let mut initial = [&outputs[..], &table.states, &derivatives, &calculated[..]].concat();
         initial.retain(|i| of(i).entry.initial != Initial::Exact);
         initial.sort_unstable();
         initial.dedup();

@@ -114,6 +114,12 @@ impl<const N: usize, const Z: usize, Y: System<N, Z>> Driven<'_, N, Z, Y> {
         span
     }
 
+    /// How long the next step may be.
+    pub(super) fn longest_step(&self, t: f64, x: &[f64; N]) -> f64 {
+        inputs_at!(self, t, u);
+        self.system.longest_step(x, u, &self.d)
+    }
+
     /// Look at inputs that may have changed, unless an event that is due does so.
     pub(super) fn revise(&mut self, t: f64, x: &mut [f64; N], solver: &mut Solver) {
         if self.system.next_event(&self.d).is_some_and(|event| due(event, t, slack(self.system))) {

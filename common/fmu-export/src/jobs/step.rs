@@ -56,14 +56,17 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
                 stable(&solver, (from, to), &eigenvalues.map(Complex::from))?;
             } // not finite: the first stage meets it and names the state
         }
+        let given = M::Inputs::<f64>::load(u);
+        let d = system.settle(&mut x, &given, self.d);
         let mut driven = Driven {
             system,
-            u: M::Inputs::<f64>::load(u),
+            u: given,
             values: u,
             duals: RefCell::new(self.duals),
             course: self.course.map(RefCell::new),
-            d: *self.d,
+            d,
         };
+        let adaptive = solver.settings().method.is_adaptive();
         let mut t = from;
         let slack = slack(system);
         // samples at the end of the step wait for the inputs of that time
@@ -92,6 +95,12 @@ impl<M: Model> Visitor<M> for Step<'_, M> {
                         // below the resolution of time
                         return Err(fault(StepError::TooMuchWork { t, t_end: to, h: span }));
                     }
+                }
+            }
+            if adaptive {
+                let longest = driven.longest_step(t, &x);
+                if longest < 0.75 * (target - t) && t + longest > t {
+                    target = t + longest;
                 }
             }
             if Z == 0 {

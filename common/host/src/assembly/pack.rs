@@ -218,6 +218,7 @@ fn profile(loaded: &mut Loaded, reference: &str) -> Profile<'static> {
             reference_inputs: None,
             plots: plots(scene, &layout.table).leak(),
         },
+        reference_method: "dop853",
     }
 }
 
