@@ -384,6 +384,7 @@ pub fn allowed(entry: &Entry) -> String {
     }
     let above = entry.min > 0.0 && entry.min <= f64::MIN_POSITIVE;
     let range = match (entry.min.is_finite(), entry.max.is_finite()) {
+        (true, true) if above => format!("> 0, <= {} {}", entry.max, entry.unit),
         (true, false) if above => format!("> 0 {}, finite", entry.unit),
         (true, false) => format!(">= {} {}, finite", entry.min, entry.unit),
         (false, true) => format!("<= {} {}, finite", entry.max, entry.unit),

@@ -141,6 +141,9 @@ impl<M: Model> Instance<M> {
         }
         values[i] = value;
         *fresh &= !self.table.affects[i];
+        if *phase == Phase::InitializationMode && Layout::<M>::INPUTS.contains(&i) {
+            *fresh = 0; // the discrete states begin with the inputs, and anything may depend on those
+        }
         if Layout::<M>::PARAMETERS.contains(&i) {
             if matches!(phase, Phase::Instantiated | Phase::InitializationMode) {
                 *model = None;

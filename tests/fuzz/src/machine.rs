@@ -146,7 +146,7 @@ impl<'a> Machine<'a> {
             )));
         }
         let messages = self.messages(call.slot);
-        if record.refused()
+        if (record.refused() || status == WARNING)
             && let Some(slot) = &self.slots[call.slot]
         {
             check_message(status, slot.categories.as_deref(), &messages, &expected.offences)
@@ -325,10 +325,11 @@ impl<'a> Machine<'a> {
         if null.is_some() {
             expected = Expected::error();
         } else if expected.allows(OK) {
-            expected = expected.or(DISCARD);
+            // a sample of a command that makes no sense may be worth a warning
+            expected = expected.or(DISCARD).or(WARNING);
         }
         let (status, updated) = self.fmu.api.update(self.handle(slot), null);
-        if status != OK {
+        if status != OK && status != WARNING {
             return Ok((Record { status, data: Vec::new() }, expected));
         }
         if updated.flags.iter().any(|flag| *flag > 1) || !updated.next.is_finite() {
@@ -391,9 +392,8 @@ impl<'a> Machine<'a> {
                 Verdict::Allowed if self.treatment_is_unfit(known) => Expected::error(),
                 Verdict::Allowed => expected.or(DISCARD),
             };
-            // a value that is taken although it makes no sense may be worth a warning
-            let any = known.values.iter().any(|value| !value.is_finite());
-            if any && expected.allows(OK) {
+            // a command that makes no sense may be worth a warning
+            if expected.allows(OK) {
                 expected = expected.or(WARNING);
             }
         }

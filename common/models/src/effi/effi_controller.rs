@@ -218,9 +218,9 @@ impl System<0, 0> for Controller {
         Ok(([], Sampled { next, ..Sampled::default() }))
     }
 
-    /// The pose is known before the first tick, so that a follower at V starts from it.
+    /// The pose is known before the first tick, so that a follower at V starts from it; zero where there is none.
     fn begin(&self, _x: &[f64; 0], u: &Inputs<f64>, d: &Sampled) -> Sampled {
-        let V_r = self.p.device.pose([u.l_1, u.l_2]).map_or(d.output.V_r, pair);
+        let V_r = self.p.device.pose([u.l_1, u.l_2]).map_or([0.0; 2], pair);
         Sampled { output: Output { V_r, ..d.output }, ..*d }
     }
 
