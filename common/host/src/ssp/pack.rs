@@ -19,8 +19,9 @@ pub fn pack(folder: &Path, fmus: &Path, references: &Path, output: &Path) -> Res
     let system = package.system()?;
     let mut files = BTreeMap::new();
     self::files(folder, "", &mut files)?;
-    let variants: Vec<String> =
-        files.keys().filter(|name| name.ends_with(".ssd") && !name.contains('/')).cloned().collect();
+    let is_structure =
+        |name: &&String| !name.contains('/') && Path::new(name).extension().is_some_and(|e| e == "ssd");
+    let variants: Vec<String> = files.keys().filter(is_structure).cloned().collect();
     for structure in variants {
         package.choose(&structure);
         for component in package.system()?.components {
