@@ -7,30 +7,19 @@
 #![allow(clippy::print_stdout, reason = "a table is its output")]
 
 use std::hint::black_box;
-use std::time::{Duration, Instant};
 
 use model::{EvaluationError, Model, System, Variables, Visitor};
 use models::absorber::RvdpAbsorber;
+
+mod timing;
 
 type Parameters = <RvdpAbsorber as Model>::Parameters;
 type Inputs = <RvdpAbsorber as Model>::Inputs<f64>;
 type Motion = <RvdpAbsorber as Model>::Motion<f64>;
 
-/// Nanoseconds per call of `body`: the smallest mean of 30 blocks of at least 2 ms.
-fn nanoseconds(mut body: impl FnMut()) -> f64 {
-    let block = Duration::from_millis(2);
-    let mut smallest = f64::INFINITY;
-    for _ in 0..30 {
-        let (begin, mut calls) = (Instant::now(), 0.0);
-        while begin.elapsed() < block {
-            for _ in 0..100 {
-                body();
-            }
-            calls += 100.0;
-        }
-        smallest = smallest.min(begin.elapsed().as_secs_f64() / calls);
-    }
-    smallest * 1e9
+/// Nanoseconds per call of `body`.
+fn nanoseconds(body: impl FnMut()) -> f64 {
+    1e9 * timing::seconds(100, body)
 }
 
 /// Time of the rates of the system that the parameters choose.

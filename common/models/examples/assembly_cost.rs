@@ -10,7 +10,6 @@
 #![allow(non_snake_case, clippy::print_stdout, reason = "symbols of the papers; a table is its output")]
 
 use std::hint::black_box;
-use std::time::{Duration, Instant};
 
 use integrators::Ode;
 
@@ -19,27 +18,14 @@ use integrators::Ode;
 mod linkage;
 use linkage::{n_four_bar, n_four_bar_state};
 
+mod timing;
+
 /// One row of the table.
 struct Row {
     n: f64,
     rhs: f64,
     projection: f64,
     error: f64,
-}
-
-/// Seconds per call of `body`: the smallest mean of 20 blocks of at least 2 ms.
-fn seconds(mut body: impl FnMut()) -> f64 {
-    let block = Duration::from_millis(2);
-    let mut smallest = f64::INFINITY;
-    for _ in 0..20 {
-        let (begin, mut calls) = (Instant::now(), 0.0);
-        while begin.elapsed() < block {
-            body();
-            calls += 1.0;
-        }
-        smallest = smallest.min(begin.elapsed().as_secs_f64() / calls);
-    }
-    smallest
 }
 
 #[allow(clippy::large_stack_arrays, reason = "sizes are static")]
@@ -51,13 +37,13 @@ fn measure<const B: usize, const N: usize, const X: usize>() -> Row {
     let x_dot = linkage.rhs(0.0, &x).expect("regular");
     let exact = -(1.5 * n + 0.5) / (4.0 / 3.0 * n + 1.0 / 3.0) * 9.81 * phi.cos();
     let error = (0..=N).map(|i| (x_dot[2 * i + 1] / exact - 1.0).abs()).fold(0.0, f64::max);
-    let rhs = seconds(|| {
+    let rhs = timing::seconds(1, || {
         black_box(linkage.rhs(0.0, black_box(&x)).expect("regular"));
     });
     // off the loops by 1e-6 rad, as after an explicit step
     let mut off = x;
     off[0] += 1e-6;
-    let projection = seconds(|| {
+    let projection = timing::seconds(1, || {
         let mut x = black_box(off);
         black_box(linkage.project(0.0, &mut x).expect("regular"));
     });

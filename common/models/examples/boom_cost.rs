@@ -7,30 +7,19 @@
 #![allow(clippy::print_stdout, reason = "a table is its output")]
 
 use std::hint::black_box;
-use std::time::{Duration, Instant};
 
 use model::{Group, Model, Outputs, System, Variables, Visitor};
 use models::boom::Boom;
 use models::boom::variables::VariantKind::{self, A, B, C};
 use models::boom::variables::{Inputs, Parameters, Use};
 
+mod timing;
+
 type Motion = <Boom as Model>::Motion<f64>;
 
-/// Microseconds per call of `body`: the smallest mean of 30 blocks of at least 2 ms.
-fn microseconds(mut body: impl FnMut()) -> f64 {
-    let block = Duration::from_millis(2);
-    let mut smallest = f64::INFINITY;
-    for _ in 0..30 {
-        let (begin, mut calls) = (Instant::now(), 0.0);
-        while begin.elapsed() < block {
-            for _ in 0..20 {
-                body();
-            }
-            calls += 20.0;
-        }
-        smallest = smallest.min(begin.elapsed().as_secs_f64() / calls);
-    }
-    smallest * 1e6
+/// Microseconds per call of `body`.
+fn microseconds(body: impl FnMut()) -> f64 {
+    1e6 * timing::seconds(20, body)
 }
 
 /// Times of the right-hand side and of the four groups of outputs [us].

@@ -9,28 +9,17 @@
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
-use std::time::{Duration, Instant};
 
 use model::{EvaluationError, Model, System, Variables, Visitor};
 use models::effi::Plant;
 use models::effi::friction::{Friction, FrictionModel};
 use models::effi::plant_variables::{Inputs, Motion, Parameters};
 
-/// Nanoseconds per call of `body`: the smallest mean of 30 blocks of at least 2 ms.
-fn nanoseconds(mut body: impl FnMut()) -> f64 {
-    let block = Duration::from_millis(2);
-    let mut smallest = f64::INFINITY;
-    for _ in 0..30 {
-        let (begin, mut calls) = (Instant::now(), 0.0);
-        while begin.elapsed() < block {
-            for _ in 0..100 {
-                body();
-            }
-            calls += 100.0;
-        }
-        smallest = smallest.min(begin.elapsed().as_secs_f64() / calls);
-    }
-    smallest * 1e9
+mod timing;
+
+/// Nanoseconds per call of `body`.
+fn nanoseconds(body: impl FnMut()) -> f64 {
+    1e9 * timing::seconds(100, body)
 }
 
 /// Handle, axis forces and bristles of a slow motion.
